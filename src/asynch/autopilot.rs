@@ -1,4 +1,4 @@
-//! Link to an autopilot on an asynchronous port, beside the relay of its drone.
+//! Link to an autopilot on an asynchronous port, next to the relay of the same drone.
 
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
@@ -20,23 +20,21 @@ use crate::time::Duration;
 
 /// Pause after the autopilot's port has failed, ended or accepted nothing.
 ///
-/// This is also the minimum time between two data exchanges with the relay, unless an event requests an earlier
-/// exchange.
+/// Also the minimum time between two data exchanges with the relay, unless an event requests an earlier one.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.
 ///
-/// One task runs the port, others give events to the link or wait for its events. The link gives the drone's position
-/// and control state to the relay, and the setpoint to the autopilot. All tasks belong to the executor that runs the
-/// relay's ports, as with [`AsyncRelay`].
+/// One task runs the port. Others pass events to the link or wait for its events. The link passes the drone's position
+/// and control state to the relay, and the setpoint to the autopilot. All tasks run on the executor of the relay's
+/// ports, as with [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Signal that wakes the future exchanging data with the relay. It is raised after received bytes and events of
-    /// the relay.
+    /// Signal that starts a data exchange with the relay. Raised after received bytes and events of the relay.
     exchange_signal: Signal,
-    /// Signal that wakes the future sending frames to the autopilot: raised when frames can be pending.
+    /// Signal that starts the transmission of frames to the autopilot.
     send_signal: Signal,
-    /// Waker of the firmware task that waits in `next_event` for an event of the autopilot link.
+    /// Waker of the task that waits in `next_event`.
     listener: Cell<Option<Waker>>,
 }
 
@@ -49,7 +47,7 @@ impl fmt::Debug for AsyncAutopilot {
 }
 
 impl AsyncAutopilot {
-    /// Creates a link that several tasks can share, from the autopilot link `link`.
+    /// Creates a link that several tasks can share, from `link`.
     pub const fn new(link: Autopilot) -> Self {
         Self {
             link: RefCell::new(link),
@@ -59,11 +57,11 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Passes an event of the relay to the autopilot link. Events that matter in flight are sent to the operator, and
-    /// a new setpoint is sent to the autopilot at once. Without this call the autopilot receives a new setpoint with
-    /// the next periodic target, within a second.
+    /// Passes an event of the relay to the autopilot link. The operator is informed of events that matter in flight,
+    /// and a new setpoint is sent to the autopilot at once.
     ///
-    /// Constant work.
+    /// Without this call the autopilot receives a new setpoint with the next periodic target, within a second. Constant
+    /// work.
     pub fn handle_event(&self, event: Event) {
         if let Ok(mut link) = self.link.try_borrow_mut() {
             link.handle_event(event);
@@ -71,12 +69,10 @@ impl AsyncAutopilot {
         self.exchange_signal.raise();
     }
 
-    /// Waits for the next event of the autopilot link and returns it to the firmware.
+    /// Completes with the next event of the autopilot link.
     ///
-    /// Only one task can wait at a time: a second task replaces the first, which is no longer woken. Dropping the
-    /// future loses no event: the event is kept for the next call.
-    ///
-    /// Constant work each time it is polled.
+    /// Only one task can wait at a time: a second one replaces the first, which is no longer woken. If the future is
+    /// dropped, the event is kept for the next call. Constant work per poll.
     pub fn next_event(&self) -> impl Future<Output = AutopilotEvent> + '_ {
         poll_fn(|cx| {
             let event = self.lend(Autopilot::poll_event).flatten();
@@ -92,12 +88,12 @@ impl AsyncAutopilot {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }
 
-    /// Moves bytes between the link and its port, and positions between the link and `relay`, forever. Join it with, or
-    /// spawn it beside, the future that runs the relay's ports.
+    /// Moves bytes between the link and its port, and positions between the link and `relay`, forever.
     ///
-    /// Each poll reads the port once ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that never
-    /// completes does not delay the reader. The future can be dropped at any `await`, and created anew. The unsent rest
-    /// of a frame is then lost, and the autopilot detects this by the checksum.
+    /// Join it with the future that runs the relay's ports, or spawn both. Each poll reads the port once
+    /// ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that never completes does not delay the
+    /// reader. The future can be dropped at any `await`, and created again. The unsent rest of a frame is then lost,
+    /// and the autopilot detects this by the checksum.
     pub async fn run(
         &self,
         relay: &AsyncRelay<'_>,
@@ -127,7 +123,7 @@ impl AsyncAutopilot {
                         yield_now().await;
                     }
                 }
-                // End of a stream that may continue, or a lost byte, which the checksum detects.
+                // The stream has ended but may continue, or a byte was lost, which the checksum detects.
                 Ok(0) | Err(_) => clock.sleep_until(clock.now() + PAUSE).await,
             }
         }
@@ -144,7 +140,7 @@ impl AsyncAutopilot {
             }
             wake(&self.listener);
             self.send_signal.raise();
-            // The frames sent now are no longer due.
+            // The frames that were sent now are no longer due.
             yield_now().await;
             let due = self.lend(|link| link.poll_timeout(now)).unwrap_or(now);
             let due = due.max(now + PAUSE);
@@ -181,7 +177,7 @@ async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// Signal that one future raises and another future waits for.
+/// Signal that one future raises and another one waits for.
 struct Signal {
     is_raised: Cell<bool>,
     waker: Cell<Option<Waker>>,
@@ -200,7 +196,7 @@ impl Signal {
         wake(&self.waker);
     }
 
-    /// Clears the signal. The caller must then handle everything for which the signal can have been raised.
+    /// Clears the signal. The caller must then handle everything that can have raised it.
     fn clear(&self) {
         self.is_raised.set(false);
     }

@@ -17,24 +17,23 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
 
-/// Pause before a port that has failed or ended is used again, in byte times. 128 byte times are 11 ms at 115 200
-/// baud.
+/// Pause before a port that has failed or ended is used again, in byte times: 11 ms at 115 200 baud.
 const PAUSE: u32 = 128;
 
 /// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.
 ///
-/// The first byte time is for a byte that the port can still be sending. The second byte time is for the tolerance of
-/// the port's clock.
+/// The first byte time is for a byte that the port can still be sending, the second for the tolerance of the port's
+/// clock.
 const PIN_HOLD: u32 = 2;
 
-/// Delimiter byte that ends every frame. If it is sent before a frame, it ends a previous frame that was cut short.
+/// Delimiter byte at the end of every frame. Sent before a frame, it ends a previous incomplete frame.
 const DELIMITER: [u8; 1] = [0];
 
-/// Link of a port: its reader and writer, the frame queue, and its driver-enable pin if it has one.
+/// Link of a port: reader and writer, frame queue, and driver-enable pin if there is one.
 ///
-/// The pin is high from before the first byte of a frame until the last queued frame has left, and low otherwise. A frame has
-/// left after the writer's `flush` and after the transmission time of its bytes, whichever is later, because `flush` of some HALs
-/// does not empty a FIFO.
+/// The pin is high from before the first byte of a frame until the last queued frame has left, and low otherwise. A
+/// frame has left after the writer's `flush` and after the transmission time of its bytes, whichever is later. The
+/// reason is that `flush` of some HALs does not empty a FIFO.
 #[derive(Debug)]
 pub struct AsyncLink<R, W, D = NoPin> {
     rx: R,
@@ -42,7 +41,7 @@ pub struct AsyncLink<R, W, D = NoPin> {
     queue: RefCell<Frames>,
 }
 
-/// Sending half of a link: the port's writer, and its driver-enable pin if it has one.
+/// Sending half of a link: the port's writer, and the driver-enable pin if there is one.
 #[derive(Debug)]
 struct Sender<W, D> {
     tx: W,
@@ -50,7 +49,7 @@ struct Sender<W, D> {
     byte_time: Duration,
     /// Time at which all bytes written so far have left the port, computed from the baud rate.
     quiet_at: Instant,
-    /// True if the last frame is possibly cut short, because its writing failed or was cancelled.
+    /// True if the last frame is possibly incomplete, because its writing failed or was cancelled.
     cut: bool,
 }
 
@@ -81,7 +80,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// Returns the future that receives, the future that sends, and the queue of the frames to send.
+    /// Returns the future that receives, the future that sends, and the queue of frames to send.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,
@@ -107,7 +106,7 @@ impl<R, W, D> AsyncLink<R, W, D> {
     }
 }
 
-/// Reads bytes from a port and gives them to the relay, forever.
+/// Reads bytes from a port and passes them to the relay, forever.
 async fn receive<R: Read>(
     rx: &mut R,
     port: Port,
@@ -128,11 +127,12 @@ async fn receive<R: Read>(
                     yield_now().await;
                 }
             }
-            // The stream has ended but may continue.
+            // The stream has ended, but may continue.
             Ok(0) => clock.sleep_until(clock.now() + pause).await,
             Err(_) => {
                 relay.count(port, |stats| stats.read_failed(Fault::Other));
-                // Reading continues at once after a single bad byte, but a port that only fails must not block the other tasks.
+                // Reading continues at once after a single bad byte. But a port that only fails must not block the
+                // other tasks.
                 yield_now().await;
                 if !waited {
                     clock.sleep_until(clock.now() + pause).await;
@@ -174,7 +174,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sends a frame, after a delimiter if the previous frame is possibly cut short. Returns true on success.
+    /// Sends a frame, after a delimiter if the previous frame is possibly incomplete. Returns true on success.
     async fn send(&mut self, frame: &[u8], clock: &impl Clock) -> bool {
         if self.cut && !self.write(&DELIMITER, clock).await {
             return false;
@@ -203,8 +203,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         true
     }
 
-    /// Waits until every written byte has left the port. The driver-enable pin must stay high until then. Does
-    /// nothing without a pin.
+    /// Waits until every written byte has left the port. The driver-enable pin must stay high until then. Does nothing
+    /// without a pin.
     async fn flush(&mut self, port: Port, relay: &AsyncRelay<'_>, clock: &impl Clock) {
         if self.pin.is_some() && self.quiet_at > Instant::ZERO {
             if self.tx.flush().await.is_err() {
@@ -215,8 +215,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the driver-enable pin high or low. Returns true on success, and without a pin. After a failure it pauses
-    /// and returns false.
+    /// Sets the driver-enable pin high or low. Returns true on success, and without a pin. After a failure it waits and
+    /// returns false.
     async fn drive(
         &mut self,
         high: bool,
@@ -241,8 +241,8 @@ fn is_empty(waiting: &RefCell<Frames>) -> bool {
     waiting.try_borrow().is_ok_and(|waiting| waiting.is_empty())
 }
 
-/// Waits for a queued frame, moves the frame into `frame`, and completes with its length in bytes. The task that
-/// queues a frame wakes this task.
+/// Moves the next queued frame into `frame`, and completes with its length, bytes. The task that queues a frame wakes
+/// this task.
 fn next<'f>(
     waiting: &'f RefCell<Frames>,
     relay: &'f AsyncRelay<'_>,
@@ -266,9 +266,10 @@ fn next<'f>(
     })
 }
 
-/// Awaits `future`; returns its output and a flag. The flag is true if the future was pending at least once, false if
-/// it never waited. If it never waited, the caller must yield to the executor, so that a port that is always ready
-/// does not block other tasks.
+/// Awaits `future`. Returns its output, and true if the future was pending at least once.
+///
+/// If it was not, the caller must yield to the executor, so that a port that is always ready does not block other
+/// tasks.
 pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;
@@ -285,7 +286,7 @@ pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
 /// queue.
 const CAPACITY: usize = 2 * MAX_FRAME;
 
-/// Queued frames in sending order, each with its delimiter.
+/// Queued frames in the order of sending, each with its delimiter.
 #[derive(Debug)]
 pub(super) struct Frames(Deque<u8, CAPACITY>);
 
@@ -303,7 +304,7 @@ impl Frames {
         CAPACITY.saturating_sub(self.0.len()) >= MAX_FRAME
     }
 
-    /// Queues a complete frame for sending; returns false if the queue has no room for the frame.
+    /// Queues a complete frame for sending. Returns false if there is no room for it.
     pub(super) fn push(&mut self, frame: &[u8]) -> bool {
         let fits = frame.len() <= CAPACITY.saturating_sub(self.0.len());
         if fits {
@@ -315,7 +316,7 @@ impl Frames {
         fits
     }
 
-    /// Moves the first queued frame into `frame` and returns its length in bytes; 0 if there is none.
+    /// Moves the first queued frame into `frame` and returns its length, bytes; 0 if there is none.
     pub(super) fn pop(&mut self, frame: &mut FrameBuf) -> usize {
         let mut len = 0;
         for place in frame {
@@ -335,11 +336,11 @@ impl Frames {
 /// Time and timers of an executor, for example `embassy-time`, `rtic-monotonics` or a virtual clock. A delay alone
 /// (`embedded-hal-async`'s `DelayNs`) is not enough, because the relay needs the current time.
 pub trait Clock {
-    /// Returns the present time since an arbitrary start; it never decreases.
+    /// Returns the present time since an arbitrary start. It never decreases.
     fn now(&self) -> Instant;
 
-    /// Completes at time `at`; at once if `at` is in the past. If another event comes first, the future is dropped,
-    /// and a new future is created later.
+    /// Completes at time `at`, or at once if `at` is in the past. If another event comes first, the future is dropped
+    /// and a new one is created later.
     fn sleep_until(&self, at: Instant) -> impl Future<Output = ()>;
 }
 

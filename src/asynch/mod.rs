@@ -1,32 +1,33 @@
-//! A relay on asynchronous serial ports ([`embedded_io_async`]). [`serial`](crate::serial) for an executor.
+//! Relay on asynchronous serial ports ([`embedded_io_async`]). Like [`serial`](crate::serial), for an executor.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | [`relay`] | a relay that several tasks share |
 //! | [`link`] | time and timers of an executor; one port: reader, writer, pending frames, driver-enable pin |
-//! | `autopilot` | with the feature `flight`: link to an autopilot on a port of its own |
-//! | this file | the whole: [`AsyncPair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`AsyncShared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
+//! | `autopilot` | with the feature `flight`: link to an autopilot on another port |
+//! | this file | the relay and its ports: [`AsyncPair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`AsyncShared`] for [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One future
-//! `run` never completes. Spawn it as a task, or join it with other futures; any executor will do that polls it when its waker is
-//! called. Other tasks of the same executor share the [`AsyncRelay`]: [`with`](AsyncRelay::with) for positions and samples,
-//! [`next_event`](AsyncRelay::next_event) for events. The time comes from a [`Clock`] of two functions.
+//! `run` never completes. Spawn it as a task, or join it with other futures. Any executor that polls it when its waker
+//! is called will do. Other tasks of the same executor share the [`AsyncRelay`]: [`with`](AsyncRelay::with) for
+//! positions and samples, [`next_event`](AsyncRelay::next_event) for events. The time comes from a [`Clock`] of two
+//! functions.
 //!
 //! # Independent ports
-//! Each port has a reader and a writer of its own, as the halves of an Embassy UART are. A writer whose `write` never completes
-//! does not delay the other port, the readers or the relay's timers. Two frames of full length are queued per port beside the one
-//! being written. With [`AsyncPair`] a frame that does not fit is dropped and counted in
-//! [`SerialStats::dropped`](crate::serial::SerialStats::dropped); with [`AsyncShared`] it stays in the relay.
+//! Each port has its reader and its writer, like the halves of an Embassy UART. A writer whose `write` never completes
+//! does not delay the other port, the readers or the relay's timers. Two frames of full length are queued per port in
+//! addition to the one being written. With [`AsyncPair`] a frame that does not fit is dropped and counted in
+//! [`SerialStats::dropped`](crate::serial::SerialStats::dropped). With [`AsyncShared`] it stays in the relay.
 //!
 //! Each poll of the future reads every port once (64 bytes at most), handles one timeout
 //! of the relay, and passes pending frames to the writers. After an operation that was ready at once it yields to the executor.
 //!
 //! # Cancellation
 //! `run` may be dropped at any `await`, and called again with the same links.
-//! - *Received bytes*: none are lost in `run`, because the relay gets them before the next `await`. Whether a dropped `read`
-//!   loses bytes depends on the reader; Embassy's buffered UARTs do not.
-//! - *Frames*: the frame being written is lost, and the next one starts with a delimiter, so that no receiver joins the two.
-//!   Queued frames are still sent. The relay retransmits what matters.
+//! - *Received bytes*: none are lost in `run`, because the relay gets them before the next `await`. A dropped `read`
+//!   loses bytes with some readers, but not with Embassy's buffered UARTs.
+//! - *Frames*: the frame being written is lost, and the next one starts with a delimiter, so that no receiver joins the
+//!   two. Queued frames are still sent. The relay retransmits what matters.
 //! - *Pin*: it keeps its level until the next `run` sets it.
 //!
 //! A failed write is retried in the same way: a delimiter, and the whole frame.
@@ -134,8 +135,8 @@ use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::track_pending;
 
-/// Ports of a relay with two links, one to each neighbour. A link with a driver-enable pin is half duplex, and a link
-/// without one is full duplex.
+/// Ports of a relay with two links, one to each neighbour. A link with a driver-enable pin is half duplex, one without
+/// it is full duplex.
 #[derive(Debug)]
 pub struct AsyncPair<UR, UW, DR, DW, UPin = NoPin, DPin = NoPin> {
     upstream: AsyncLink<UR, UW, UPin>,
@@ -163,12 +164,12 @@ where
         }
     }
 
-    /// Moves bytes between the relay and its ports and handles its timers, forever. The documentation of [`asynch`](self)
-    /// describes the work per poll and the effect of dropping the future.
+    /// Moves bytes between the relay and its ports and handles its timers, forever. The documentation of
+    /// [`asynch`](self) describes the work per poll and the effect of dropping the future.
     ///
-    /// `store` writes a [changed record](Relay::unpersisted) to memory that survives a reboot, and returns true if it is stored;
-    /// until then the relay sends nothing. Without such memory pass `|_| true`, and leave the relay off after a reboot in
-    /// flight.
+    /// `store` writes a [changed record](Relay::unpersisted) to memory that survives a reboot, and returns true if it
+    /// is stored. Until then the relay sends nothing. Without such memory pass `|_| true`, and leave the relay off
+    /// after a reboot in flight.
     pub async fn run(
         &mut self,
         relay: &AsyncRelay<'_>,
@@ -179,7 +180,8 @@ where
         let (rx_down, tx_down, down) = self.downstream.ends(Port::Downstream, relay, clock);
         let queues = [(Port::Upstream, up), (Port::Downstream, down)];
         let runs = run_relay(relay, &queues, clock, &mut store);
-        // The order matters: bytes read go into this turn of the relay, and its frames are written at once.
+        // The order matters: bytes that were read are used in this turn of the relay, and its frames are written at
+        // once.
         match select5(rx_up, rx_down, runs, tx_up, tx_down).await {
             Either5::First(never)
             | Either5::Second(never)
@@ -195,9 +197,10 @@ where
     }
 }
 
-/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus
-/// with a driver-enable pin. The modem controls the access to the channel; this crate only keeps relays from
-/// retransmitting at the same times.
+/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus with
+/// a driver-enable pin.
+///
+/// The modem controls the access to the channel. This crate only keeps relays from retransmitting at the same times.
 #[derive(Debug)]
 pub struct AsyncShared<R, W, Pin = NoPin> {
     channel: AsyncLink<R, W, Pin>,
@@ -230,7 +233,7 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
     }
 }
 
-/// Runs the relay itself, forever: handles its timers and queues its frames for the ports.
+/// Handles the relay's timers and queues its frames for the ports, forever.
 async fn run_relay(
     relay: &AsyncRelay<'_>,
     queues: &[(Port, &RefCell<Frames>)],
@@ -256,7 +259,7 @@ async fn run_relay(
     }
 }
 
-/// Runs the relay once: handles its due timers, stores its changed votes, and queues its frames.
+/// Handles the relay's due timers, stores its changed votes, and queues its frames.
 ///
 /// Returns the time of the relay's next timeout; `None` if there is none.
 fn turn(

@@ -1,4 +1,4 @@
-//! A relay that several tasks of one executor share. The task that runs its ports, and tasks with inputs.
+//! Relay shared by several tasks of one executor: the task that runs its ports, and tasks with inputs.
 
 use core::cell::{Cell, RefCell};
 use core::fmt;
@@ -9,17 +9,17 @@ use crate::event::Event;
 use crate::relay::{Port, Relay};
 use crate::serial::SerialStats;
 
-/// Relay shared by tasks, with the wakers of these tasks and the counters of the ports.
+/// Relay shared by tasks, the wakers of these tasks, and the counters of the ports.
 ///
-/// All tasks must run on one executor, on one core and at one priority. They do not wait for each other, because none holds the
-/// relay across an `await`. An interrupt passes its data through a channel to such a task.
+/// All tasks must run on one executor, on one core and at one priority. They do not wait for each other, because none
+/// holds the relay across an `await`. An interrupt passes its data to such a task through a channel.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// True if the relay has had new input since the task that runs its ports last ran.
+    /// True if the relay has new input since the task of its ports last ran.
     changed: Cell<bool>,
     /// Waker of the task that runs the relay's ports.
     runner: Cell<Option<Waker>>,
-    /// Waker of the firmware's task that waits for an event of the relay.
+    /// Waker of the task that waits for an event of the relay.
     listener: Cell<Option<Waker>>,
     /// Counters of the ports: entry 0 for the upstream or the shared port, entry 1 for the downstream port.
     stats: [Cell<SerialStats>; 2],
@@ -46,23 +46,25 @@ impl<'a> AsyncRelay<'a> {
         }
     }
 
-    /// Passes the relay to `work`, and wakes the task that runs its ports. For example, `work` reports a position or a
-    /// sample. The task of the ports runs as soon as the calling task waits. Returns `None`, and does nothing, inside
-    /// the `work` of another call, which already has the relay. Apart from `work` the call takes constant time.
+    /// Passes the relay to `work`, and wakes the task of its ports. For example, `work` reports a position or a sample.
+    /// The woken task runs as soon as the calling task waits.
+    ///
+    /// Returns `None`, and does nothing, inside the `work` of another call, which already has the relay. Apart from
+    /// `work` the call takes constant time.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
         self.notify_runner();
         done
     }
 
-    /// Passes the relay to `look`, which reads a setpoint or counters. Does not wake the task of the ports. Returns
+    /// Passes the relay to `look`, which reads for example the setpoint. Does not wake the task of the ports. Returns
     /// `None` inside the `work` or `look` of another call, which already has the relay.
     pub fn look<R>(&self, look: impl FnOnce(&Relay) -> R) -> Option<R> {
         self.lend(|relay| look(relay))
     }
 
-    /// Completes with the next event for the firmware. Only one task can wait at a time; a second task replaces the
-    /// first. Dropping the future loses no event. Takes constant time per poll.
+    /// Completes with the next event for the firmware. Only one task can wait at a time; a second one replaces the
+    /// first. If the future is dropped, no event is lost. Takes constant time per poll.
     pub fn next_event(&self) -> impl Future<Output = Event> + '_ {
         poll_fn(|cx| {
             let event = self.lend(Relay::poll_event).flatten();
@@ -73,14 +75,14 @@ impl<'a> AsyncRelay<'a> {
         })
     }
 
-    /// Returns the counters of `port`. The upstream and the shared port share one set of counters, since no relay has
-    /// both.
+    /// Returns the counters of `port`. The upstream and the shared port have the same counters, because no relay has
+    /// both ports.
     pub fn stats(&self, port: Port) -> SerialStats {
         self.counters(port).get()
     }
 
-    /// Passes the relay to `work` without waking the task that runs the ports. Returns `None` if another call already
-    /// has the relay.
+    /// Passes the relay to `work` without waking the task of the ports. Returns `None` if another call already has the
+    /// relay.
     pub(super) fn lend<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }
@@ -91,18 +93,18 @@ impl<'a> AsyncRelay<'a> {
         wake(&self.runner);
     }
 
-    /// Wakes the firmware task that waits for the relay's next event.
+    /// Wakes the task that waits for the relay's next event.
     pub(super) fn notify_listener(&self) {
         wake(&self.listener);
     }
 
-    /// Records that the task which runs the relay's ports has handled all inputs so far.
+    /// Records that the task of the ports has handled all inputs so far.
     pub(super) fn mark_handled(&self) {
         self.changed.set(false);
     }
 
-    /// Completes once the relay has input that the task which runs its ports has not handled. If there is such input
-    /// already, the future completes at once.
+    /// Completes once the relay has input that the task of the ports has not handled. Completes at once if there is
+    /// such input already.
     pub(super) fn changed(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             store_waker(&self.runner, cx);

@@ -1,4 +1,4 @@
-//! Line from transmitter to receiver on earth: conversion between geodetic and mission positions.
+//! Line from transmitter to receiver on earth: converts geodetic to mission positions and back.
 //!
 //! # Derivation
 //! Everything is on the WGS84 ellipsoid in earth-centred coordinates, in f64. T and R are the two sites and P is the point, all
@@ -18,24 +18,24 @@
 //! AMSL = tx + (rx - tx) x / D + h. A height above the sea follows the earth's curvature.
 //!
 //! # Distance of a far point
-//! A point too far away for a position still has a distance from the line. Its foot is where the plane through the point and the
-//! line's axis of rotation, at the centre of curvature, meets the line: φ = atan2((P - m) · u, (P - m) · up + r), x - D / 2 = r
-//! φ, clamped to the two ends. The distance is the chord from the foot to the point, scaled by the ratio of arc to chord of a
-//! sphere, at the angle between the two points at the earth's centre.
+//! A point too far away for a position still has a distance from the line. Consider the plane through the point and the
+//! line's axis of rotation, at the centre of curvature. It meets the line at the foot: φ = atan2((P - m) · u, (P - m) ·
+//! up + r), x - D / 2 = r φ, clamped to the two ends. The distance is the chord from the foot to the point, scaled by
+//! the ratio of arc to chord of a sphere, at the angle between the two points at the earth's centre.
 //!
 //! # Accuracy
-//! Error against geodesics, for points up to 500 m beside the line: at most 1 mm for lines up to 10 km, 5 mm for 100 km
-//! (`positions_agree_with_geodesics` in `host-tests/tests/axis`); round trip within one unit of [`Geodetic`]. The distance of a far
-//! point: within 0.2 % anywhere on earth, and 0.002 % up to 1000 km (`distances_agree_with_geodesics`, in the same folder).
+//! Error compared with geodesics, for points up to 500 m beside the line: at most 1 mm for lines up to 10 km, 5 mm for
+//! 100 km (`positions_agree_with_geodesics` in `host-tests/tests/axis`). Round trip: within one unit of [`Geodetic`].
+//! Distance of a far point: within 0.2 % anywhere on earth, and 0.002 % up to 1000 km
+//! (`distances_agree_with_geodesics`, in the same folder).
 
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Maximum difference, m, between a mission's distance and the distance of its Tx and Rx positions. The tolerance
-/// covers rounding.
+/// Maximum difference between a mission's distance and that of its Tx and Rx positions, m. It covers rounding.
 const TOLERANCE_M: f64 = 0.05;
 
-/// Reason why the positions of transmitter and receiver define no line.
+/// Reason why the positions of Tx and Rx define no line.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AxisError {
@@ -45,12 +45,12 @@ pub enum AxisError {
     Rx(Geodetic),
     /// The transmitter and the receiver are less than 10 m apart.
     TooShort {
-        /// Distance between transmitter and receiver along a straight line, m.
+        /// Straight distance between transmitter and receiver, m.
         distance_m: f64,
     },
     /// The transmitter and the receiver are more than 100 km apart.
     TooLong {
-        /// Distance between transmitter and receiver along a straight line, m.
+        /// Straight distance between transmitter and receiver, m.
         distance_m: f64,
     },
 }
@@ -89,11 +89,11 @@ pub struct Axis {
     middle: Vector,
     /// Unit vector toward the receiver, at the middle of the line.
     along: Vector,
-    /// Unit vector to the right of the line from Tx to Rx, at the middle of the line.
+    /// Unit vector to the right, as seen from Tx toward Rx, at the middle of the line.
     right: Vector,
-    /// Unit vector upward, at the middle of the line from Tx to Rx.
+    /// Unit vector upward, at the middle of the line.
     up: Vector,
-    /// Half the length of the chord from transmitter to receiver, m.
+    /// Half the straight distance from transmitter to receiver, m.
     half_chord_m: f64,
     /// Radius of curvature of the earth's surface along the line, m.
     radius_m: f64,
@@ -104,8 +104,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. It applies sideways, upward,
-    /// before Tx and beyond Rx.
+    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. It applies to all directions:
+    /// sideways, upward, before Tx and beyond Rx.
     pub const AROUND_M: f32 = 5_000.0;
 
     /// Creates the line from a transmitter at `tx` to a receiver at `rx`, both on the ground.
@@ -173,12 +173,11 @@ impl Axis {
         Self::try_new(sites.tx, sites.rx)
     }
 
-    /// Returns the positions of transmitter and receiver, the ends of the line.
     pub(super) const fn sites(&self) -> Sites {
         self.sites
     }
 
-    /// Distance D from transmitter to receiver along the ground, m.
+    /// Returns the distance D from transmitter to receiver along the ground, m.
     pub const fn distance_m(&self) -> f64 {
         self.distance_m
     }
@@ -191,7 +190,7 @@ impl Axis {
 
     /// Converts a geodetic position to mission coordinates.
     ///
-    /// `None` if it is invalid, or farther than [`AROUND_M`](Self::AROUND_M) from the line or its ends. Constant work.
+    /// `None` if it is invalid, or farther than [`AROUND_M`](Self::AROUND_M) from the line. Constant work.
     pub fn place(&self, point: Geodetic) -> Option<Placement> {
         if !point.is_valid() {
             return None;
@@ -205,7 +204,7 @@ impl Axis {
             y_m: narrow(from.dot(self.right)),
             altitude_m: narrow(h),
         };
-        // A point on the far side of the earth has a small x and y as well, but is too deep.
+        // A point on the other side of the earth has a small x and y as well, but is too deep.
         let is_near = self.is_around(place)
             && from.dot(self.up).abs() <= self.half_chord_m + f64::from(Self::AROUND_M);
         is_near.then_some(place)
@@ -252,7 +251,7 @@ impl Axis {
 
     /// Converts mission coordinates to a geodetic position.
     ///
-    /// `None` if they are not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line or its ends. Constant work.
+    /// `None` if they are not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line. Constant work.
     pub fn point(&self, place: Placement) -> Option<Geodetic> {
         if !self.is_around(place) {
             return None;
@@ -286,7 +285,7 @@ impl Axis {
         narrow(libm::atan2(east, north))
     }
 
-    /// Returns the angle between this line and the line `other`, each at its own Tx, radians in [0, π]. Constant work.
+    /// Returns the angle from this line to the line `other`, each at its Tx, radians in [0, π]. Constant work.
     pub fn turn_rad(&self, other: &Self) -> f32 {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }
@@ -296,7 +295,7 @@ impl Axis {
         turned(self.azimuth_rad(x_m) + aside_rad)
     }
 
-    /// Converts a velocity along x, y and up at `x_m` to a velocity north, east and down; all in m/s. Constant work.
+    /// Converts a velocity along x, y and up at `x_m` to north, east and down; all in m/s. Constant work.
     pub fn to_ned(&self, x_m: f32, velocity_m_s: [f32; 3]) -> [f32; 3] {
         let [x, y, h] = velocity_m_s.map(f64::from);
         let [north, east] = self.direction(x_m);
@@ -312,7 +311,8 @@ impl Axis {
         let turn = c / self.radius_m;
         let tangent = self.along.minus(self.up.times(turn));
         let normal = self.up.plus(self.along.times(turn)).unit();
-        // North is the projection of the earth's axis onto the ground plane; both are as long as the cosine of the latitude.
+        // North is the projection of the earth's axis onto the ground plane. North and east are each as long as the
+        // cosine of the latitude.
         let north = tangent.dot(Vector::POLE.minus(normal.times(normal.z)));
         let east = tangent.dot(Vector::POLE.cross(normal));
         let length = libm::sqrt(north * north + east * east);
@@ -323,7 +323,7 @@ impl Axis {
         }
     }
 
-    /// Returns true if `place` is finite and near the line: at most [`AROUND_M`](Self::AROUND_M) away.
+    /// Returns true if `place` is finite and at most [`AROUND_M`](Self::AROUND_M) from the line.
     #[inline(never)] // called from several places
     pub(super) fn is_around(&self, place: Placement) -> bool {
         let Placement {
@@ -359,8 +359,8 @@ fn chord(arc: f64, radius: f64) -> f64 {
     arc * (1.0 - q * q / 6.0)
 }
 
-/// Minimum length of a line from Tx to Rx, m. On a shorter line the 1e-7 degree steps of the two positions (1 cm)
-/// would turn its direction by more than 1 mrad.
+/// Minimum length of a line from Tx to Rx, m. Positions have steps of 1e-7 degrees (1 cm), which would turn the
+/// direction of a shorter line by more than 1 mrad.
 #[doc(hidden)] // for the tests of this workspace
 pub const SHORTEST_M: f64 = 10.0;
 
@@ -389,7 +389,7 @@ impl Vector {
         z: 1.0,
     };
 
-    /// Returns the point of the WGS84 ellipsoid with the latitude and longitude of `point`, at height 0.
+    /// Returns the point of the WGS84 ellipsoid at the latitude and longitude of `point`, at height 0.
     pub(super) fn on_ellipsoid(point: Geodetic) -> Self {
         let [sin_lat, cos_lat] = sine_and_cosine(point.lat_e7);
         let [sin_lon, cos_lon] = sine_and_cosine(point.lon_e7);
@@ -410,7 +410,7 @@ impl Vector {
     }
 
     /// Returns latitude and longitude of this point, radians. The point must be near the ellipsoid, because the
-    /// computation is a single step of Bowring's method.
+    /// computation takes a single step of Bowring's method.
     pub(super) fn latitude_and_longitude(self) -> [f64; 2] {
         let p = libm::sqrt(self.x * self.x + self.y * self.y);
         // b / a. The tangent of the parametric latitude is z / (p b / a).
@@ -466,7 +466,7 @@ impl Vector {
     }
 }
 
-/// Returns the radius of curvature of the WGS84 ellipsoid, m, in the direction `along`. `normal` is the ellipsoid's
+/// Returns the radius of curvature of the WGS84 ellipsoid in the direction `along`, m. `normal` is the ellipsoid's
 /// normal there.
 pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     let sin2 = normal.z * normal.z;
@@ -488,8 +488,8 @@ pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
 /// Returns sine and cosine of an angle in units of 10⁻⁷ degrees, within a unit in the last place.
 ///
-/// The angle is reduced to an eighth of a turn in integers, without an error. Sine and cosine of the rest are
-/// fdlibm's series. A general function for f64 would be ten times as large.
+/// The angle is reduced to an eighth of a turn in integers, without an error. Sine and cosine of the rest are fdlibm's
+/// series. A general function for f64 would be ten times as large.
 #[inline(never)] // called from several places
 pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     const EIGHTH: i32 = 450_000_000;

@@ -1,11 +1,11 @@
-//! Line on earth along which a mission is flown, and the drone's speed.
+//! Line on earth along which a mission is flown, and the drone's speed limit.
 
 use super::autopilot::carrot::Pace;
 use super::axis::{Axis, AxisError};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 
-/// Line on earth from Tx to Rx, and the speed limit with which a drone flies along it.
+/// Line on earth from Tx to Rx, and the speed limit of a drone that flies along it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
     /// Line on earth from transmitter to receiver.
@@ -21,16 +21,16 @@ pub struct Course {
 pub enum CourseError {
     /// The positions of the transmitter and the receiver do not define a line.
     Axis(AxisError),
-    /// The distance of Tx and Rx along the ground is not the mission's distance. The value is the distance along the
-    /// ground, m.
+    /// The distance of Tx and Rx along the ground differs from the mission's distance. The value is the distance along
+    /// the ground, m.
     Distance(f64),
 }
 
 impl Course {
     /// Returns the course of a drone that flies `mission`: its line on earth and its speed limit.
     ///
-    /// `sites` are the positions of Tx and Rx. `speed_m_s` is the speed limit, 0.1 to 20 m/s, or 0 for the speed
-    /// limit of [`Pace::default`]. Constant work.
+    /// `sites` are the positions of Tx and Rx. `speed_m_s` is the speed limit, m/s: 0.1 to 20, or 0 for that of
+    /// [`Pace::default`]. Constant work.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }

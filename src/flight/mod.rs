@@ -1,11 +1,11 @@
-//! Flight: geodetic positions of the agreed place, and the autopilot.
+//! Flight: positions on earth, and the link to the autopilot.
 //!
 //! | module | subject |
 //! | --- | --- |
-//! | [`axis`] | the line from transmitter to receiver on earth, and positions along it |
-//! | [`course`] | that line for a mission, and the speed along it |
+//! | [`axis`] | the line from transmitter to receiver on earth, and positions relative to it |
+//! | [`course`] | that line for a mission, and the speed limit |
 //! | `mavlink` | MAVLink 2 messages |
-//! | [`autopilot`] | targets for the autopilot, engagement by the pilot, and the drone's position |
+//! | [`autopilot`] | targets for the autopilot, control given by the pilot, and the drone's position |
 //!
 //! ```
 //! use uav_relay::Placement;

@@ -1,13 +1,13 @@
-//! Ground station at the transmitter or the receiver. It uploads missions and reports interference.
+//! Ground station at the transmitter or the receiver: uploads missions and reports interference.
 //!
 //! | progress | state of the polled relay | action |
 //! | --- | --- | --- |
-//! | `Offering` | holds an older mission, or has not answered | send a hello every second, and the mission in reply to the relay's hello; after three unanswered hellos poll the next of the four nearest relays |
-//! | `Stored` | holds the new mission, flies another | poll every second |
-//! | `Adopted` | flies the new mission; not all of its view are known to | poll every second |
-//! | `Flown` | all of its view fly the mission; relays outside a view take no part until they do | done |
+//! | `Offering` | has an older mission, or has not answered | send a hello every second, and the mission in reply to the relay's hello; after three unanswered hellos poll the next of the four nearest relays |
+//! | `Stored` | has stored the new mission, flies another | poll every second |
+//! | `Adopted` | flies the new mission; it is not known if all relays of its view do | poll every second |
+//! | `Flown` | all relays of its view fly the mission; relays outside a view take no part until they do | done |
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
-//! | `Outdated` | holds a newer mission, or before any relay holds the upload another mission with its version | done: the upload needs a larger version |
+//! | `Outdated` | has a newer mission, or, before any relay has the upload, another mission with the upload's version | done: the upload needs a larger version |
 
 use crate::features::TELEMETRY;
 use crate::mission::Mission;
@@ -27,27 +27,27 @@ use crate::wire::message::{Detail, Entry, Hello, Message, Reports};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay after which another node with its node number is accepted, 15 s. Relays use
-/// `Settings::dead_after` as this time.
+/// Silence of a relay after which another node with its node number is accepted. Relays use `Settings::dead_after` for
+/// this.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
-/// Time after which the ground station repeats a hello that the polled relay has not answered.
+/// Time after which an unanswered hello to the polled relay is repeated.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Maximum number of relays whose reports are stored, 11 KB in all; 0 without the feature `telemetry`.
+/// Maximum number of relays whose reports are stored: 11 KB in all. 0 without the feature `telemetry`.
 const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 
-/// Interval between two requests for the reports of all relays. Each request goes to another relay in reach.
+/// Interval between two requests for the reports of all relays. They go to the relays in reach alternately.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
-/// Number of unanswered hellos to one relay, after which the station sends hellos to the next relay.
+/// Number of unanswered hellos to one relay after which the next relay is polled.
 const QUERIES_PER_RELAY: u8 = 3;
 
-/// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
+/// Ground station at the transmitter or the receiver: uploads missions and reports interference.
 ///
-/// After every input call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then wait for a byte or for
-/// [`poll_timeout`](Self::poll_timeout). The station accepts any bytes, and ignores frames that are not addressed to
-/// it.
+/// It does no input or output (sans-IO). After every input call [`poll_transmit`](Self::poll_transmit) until it returns
+/// `None`, then wait for a byte or for [`poll_timeout`](Self::poll_timeout). The station accepts any bytes, and ignores
+/// frames that are not addressed to it.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -83,25 +83,25 @@ pub struct Ground {
     base: u16,
     end: Side,
     node: u16,
-    /// Number of relays in radio reach of the station: one over a wire, up to four over a shared channel.
+    /// Number of relays in radio reach: one over a wire, up to four over a shared channel.
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Sequence number of the last query for the relays' mission, which the reply repeats. 0 if no query was sent.
+    /// Number of the last query for the relays' mission, repeated in the reply. 0 if none was sent.
     query_number: u16,
     flown: Option<FlownMission>,
-    /// Distance of the relay that is polled now, in relays along the chain: 1 for the nearest.
+    /// Distance of the polled relay, in relays: 1 for the nearest.
     distance: u16,
     unanswered: u8,
-    /// Newest mission that the polled relay has stored, by its last hello. `None` until a hello is received.
+    /// Newest mission that the polled relay has stored, by its last hello. `None` before its first hello.
     relay_mission: Option<MissionId>,
-    /// True from a hello to the polled relay until that relay's next hello, which is the reply.
+    /// True from a hello to the polled relay until that relay's next hello.
     query_sent: bool,
-    /// Nonce in the polled relay's last hello, which the next mission offer must repeat. `None` if no offer is due.
+    /// Nonce in the polled relay's last hello, repeated by the next mission offer. `None` if no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
-    /// Clock of the station's timers, which never runs backwards.
+    /// Clock of the station's timers. It never runs backwards.
     clock: MonotonicClock,
     reports: PendingReports,
     watching: Watching,
@@ -154,8 +154,8 @@ impl Ground {
 
     /// Queries the mission that the relays fly; [`Ground::flown`] returns the answer. Ends an upload in progress.
     ///
-    /// The polled relay also sends the uploaded mission that it has stored, if any. The ground station thus learns
-    /// the changes of earlier uploads.
+    /// The polled relay also sends the uploaded mission that it has stored, if any. The station thus learns the changes
+    /// made by earlier uploads.
     pub fn request_flown(&mut self, now: Instant) {
         self.cancel();
         self.flown = None;
@@ -171,7 +171,7 @@ impl Ground {
         self.flown.as_ref()
     }
 
-    /// Starts to upload the mission `upload` to the relays. It replaces an upload in progress.
+    /// Starts to upload the mission `upload` to the relays. Replaces an upload in progress.
     ///
     /// # Errors
     /// Returns [`UploadError::Base`] if the upload is for relays that loaded another mission before flight.
@@ -185,9 +185,9 @@ impl Ground {
         Ok(())
     }
 
-    /// Ends an upload or a query in progress: nothing more is offered to the relays.
+    /// Ends an upload or a query in progress. Nothing more is offered to the relays.
     ///
-    /// A relay that has stored the mission already still passes it on.
+    /// A relay that has already stored the mission still offers it to its neighbours.
     pub fn cancel(&mut self) {
         self.upload = None;
         self.progress = Progress::Idle;
@@ -196,7 +196,7 @@ impl Ground {
         self.repeat_at = None;
     }
 
-    /// Schedules the first hello of an upload or a query, to the relay that is polled now.
+    /// Schedules the first hello of an upload or a query, to the polled relay.
     fn start(&mut self, now: Instant) {
         self.relay_mission = None;
         self.offer_number = None;
@@ -205,12 +205,12 @@ impl Ground {
         self.repeat_at = Some(self.clock.advance(now) + REPEAT_AFTER);
     }
 
-    /// Sends the interference measured at this station to the relays in reach. Returns false, and does nothing, if
-    /// `power_w` is outside 1e-30 to 1e6 W.
+    /// Sends the interference measured at this station to the relays in reach.
     ///
-    /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged
-    /// long enough for the relative error of [`Listen`](crate::Listen). One measurement per
-    /// [`Listen::every`](crate::Listen::every) is enough.
+    /// `power_w` is the mean received power with the receiver's noise but without the chain's signals, averaged long
+    /// enough for the relative error of [`Listen`](crate::Listen). One measurement per
+    /// [`Listen::every`](crate::Listen::every) is enough. Returns false, and does nothing, if `power_w` is outside
+    /// 1e-30 to 1e6 W.
     ///
     /// Over a wire one frame of 23 bytes and a tag is sent, on a shared channel one such frame to each of the four
     /// nearest relays. A relay that is absent or has restarted is sent a handshake instead. Reports are not
@@ -232,8 +232,8 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of intact frames that were rejected. A frame is rejected if its sender is not in reach or
-    /// has loaded another mission, or if the frame is forged, replayed or malformed.
+    /// Returns the number of intact frames that were rejected. The sender is not in reach or has loaded another
+    /// mission, or the frame is forged, replayed or malformed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -250,10 +250,10 @@ impl Ground {
         &self.stats
     }
 
-    /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay has
-    /// proven that it has the key.
+    /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay has proven
+    /// that it has the key.
     ///
-    /// After a restart or a new handshake a relay is unverified until it answers. Work: four relays at most.
+    /// After a restart or a new handshake it is false until the relay answers. Work: four relays at most.
     pub fn relays_in_reach(&self) -> impl Iterator<Item = (u16, bool)> {
         let nodes = (1..=self.reach).map(|distance| self.at(distance));
         nodes.map(|node| (node, self.endpoint.knows(node)))
@@ -291,8 +291,8 @@ impl Ground {
         }
     }
 
-    /// Handles a message of relay `sender`, which is `distance` relays away from this station. `message` is `None` if
-    /// the frame's body is malformed.
+    /// Handles a message of relay `sender`, which is `distance` relays away. `message` is `None` if the frame's body is
+    /// malformed.
     fn handle_message(&mut self, sender: u16, distance: u16, message: Option<&Message>) {
         let counter = match message {
             Some(Message::Hello(hello)) if hello.mission == self.base => {
@@ -321,14 +321,14 @@ impl Ground {
         bump(counter);
     }
 
-    /// Returns true while the query for the mission that the relays fly is unanswered.
+    /// Returns true while the query for the relays' mission is unanswered.
     const fn is_querying(&self) -> bool {
         self.upload.is_none() && self.repeat_at.is_some()
     }
 
-    /// Returns true if `upload` answers the query for the mission that the relays fly.
+    /// Returns true if `upload` answers the query for the relays' mission.
     ///
-    /// `answer` is the number in the relay's offer, which must repeat the number of the query.
+    /// `answer` is the number in the relay's offer, which must be the number of the query.
     fn answers_query(&self, upload: &Upload, answer: u16) -> bool {
         self.is_querying() && answer == self.query_number && upload.base() == self.base
     }
@@ -346,12 +346,13 @@ impl Ground {
         self.repeat_at = None;
     }
 
-    /// Handles a hello of relay `by`, `distance` relays away, that answers the query for the mission. If the relay
-    /// has stored an uploaded mission, the relay sends this mission in its next message.
+    /// Handles a hello of relay `by`, `distance` relays away, that answers the query for the mission. If the relay has
+    /// stored an uploaded mission, it sends it in its next message.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
-        // A refused mission need not be the one that the relay holds: the upload that follows shows which it holds.
+        // The refused mission is possibly not the one that the relay has stored. The upload that follows shows which
+        // one that is.
         if hello.refused && self.flown.is_some() {
             return;
         }
@@ -368,7 +369,7 @@ impl Ground {
         self.flown = Some(flown);
     }
 
-    /// Handles a hello of relay `by`, `distance` hops away. The hello reports the newest mission of that relay.
+    /// Handles a hello of relay `by`, `distance` relays away. It reports the relay's newest mission.
     fn on_hello(&mut self, by: u16, distance: u16, hello: Hello) {
         if self.is_querying() {
             return self.on_query_reply(by, distance, hello);
@@ -377,7 +378,7 @@ impl Ground {
         let mission_id = upload.id();
         self.unanswered = 0;
         self.distance = distance;
-        // A relay does not hold a refused mission, which may be another one than this upload.
+        // A relay does not store a refused mission, which may be another one than this upload.
         let is_refused = hello.refused && hello.latest_mission == mission_id;
         let holds = if hello.refused && !is_refused {
             MissionId {
@@ -398,13 +399,14 @@ impl Ground {
             && holds.version == mission_id.version
             && matches!(self.progress, Progress::Offering)
         {
-            // Another station has uploaded with the same version. This upload has reached no relay, and is based on an older mission.
+            // Another station has uploaded with the same version. This upload has reached no relay, and is based on an
+            // older mission.
             Progress::Outdated {
                 version: holds.version,
             }
         } else if holds < mission_id {
-            // A relay also answers an offer with a hello. Only an answer to a question causes an offer, otherwise the exchange
-            // would not end.
+            // A relay also answers an offer with a hello. Only an answer to a query causes an offer. Otherwise the
+            // exchange would not end.
             if core::mem::take(&mut self.query_sent) {
                 self.offer_number = Some(hello.offer_number);
                 self.due = true;
@@ -435,8 +437,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next hello if its time has come: to the same relay as before, or to the next relay. Takes constant
-    /// time.
+    /// Schedules the next hello if it is due: to the same relay as before, or to the next one. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if TELEMETRY {
@@ -444,7 +445,7 @@ impl Ground {
             let is_silent = self.watching.request(now, self.reach, self.node.into());
             let to = self.at(self.watching.distance);
             if let Some(session) = self.endpoint.session_mut().filter(|_| is_silent) {
-                // The relay may have restarted: then it accepts only handshakes.
+                // The relay may have restarted. Then it accepts only handshakes.
                 session.request_reply_of_silent(to);
             }
         }
@@ -461,7 +462,7 @@ impl Ground {
             } else {
                 1
             };
-            // The relay may have restarted and not know this node.
+            // The relay may have restarted, and may not know this node.
             self.endpoint.greet(self.to());
         }
         self.due = true;
@@ -472,7 +473,7 @@ impl Ground {
         self.at(self.distance)
     }
 
-    /// Returns the node number of the relay `distance` places from this station; 1 is the nearest.
+    /// Returns the node number of the relay `distance` relays away; 1 is the nearest.
     fn at(&self, distance: u16) -> u16 {
         match self.end {
             Side::Upstream => distance,
@@ -480,7 +481,7 @@ impl Ground {
         }
     }
 
-    /// Returns the latest time for the next call of [`Ground::handle_timeout`]; `None` if no timer runs.
+    /// Returns the time by which [`Ground::handle_timeout`] must be called; `None` if no timer runs.
     pub fn poll_timeout(&self) -> Option<Instant> {
         let next = [self.repeat_at, self.watching.repeat_at]
             .into_iter()
@@ -489,7 +490,8 @@ impl Ground {
         Some(self.clock.external(next?))
     }
 
-    /// Writes the next frame into `frame` and returns its length in bytes; `None` if there is no frame. Work: one frame and one tag.
+    /// Writes the next frame into `frame` and returns its length, bytes. `None` if there is none. Work: one frame and
+    /// one tag.
     pub fn poll_transmit(&mut self, frame: &mut [u8; MAX_FRAME]) -> Option<usize> {
         if self.endpoint.is_exhausted() {
             return None;
@@ -545,8 +547,8 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Writes the interference report to the next relay; `None` if no report is pending. A handshake is written
-    /// instead if that relay cannot verify frames of this station yet.
+    /// Writes the interference report to the next relay; `None` if none is pending. If that relay cannot verify frames
+    /// of this station yet, a handshake is written instead.
     fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {
@@ -571,7 +573,7 @@ impl Ground {
 
 #[cfg(feature = "telemetry")]
 impl Ground {
-    /// Requests the reports of all relays from now on if `is_on` is true. Otherwise ends the requests.
+    /// Starts (`is_on` is true) or ends the requests for the reports of all relays.
     ///
     /// The station repeats the request every 5 s. Relays report for 60 s after the last request.
     pub fn watch(&mut self, now: Instant, is_on: bool) {
@@ -580,13 +582,12 @@ impl Ground {
         _ = self.watching.request(now, self.reach, self.node.into());
     }
 
-    /// Returns the newest report of each relay, in the order of the node numbers. At most 128 relays are stored: the
-    /// first that have reported.
+    /// Returns the newest report of each relay, in the order of the node numbers. At most 128 relays are stored: those
+    /// that reported first.
     ///
-    /// A report that has arrived is returned only after the next call of [`handle_timeout`](Self::handle_timeout).
-    /// The time of this call counts as the time of its arrival. A relay sends details (setpoint, agreed position,
-    /// neighbours, interference, version) only with every eighth report. The returned details come from the last
-    /// report that had details.
+    /// A received report is returned only after the next call of [`handle_timeout`](Self::handle_timeout), whose time
+    /// counts as its arrival. A relay sends details (setpoint, agreed position, neighbours, interference, version) only
+    /// with every eighth report. The returned details are the last ones received.
     pub fn reports(&self) -> impl Iterator<Item = crate::Report> {
         let known = self.watching.known.iter();
         known.map(|known| {
@@ -595,28 +596,27 @@ impl Ground {
     }
 }
 
-/// Requests for the reports of all relays, and the reports.
+/// Requests for the reports of all relays, and the received reports.
 #[derive(Clone, Debug)]
 struct Watching {
-    /// Number of relays in the mission that the relays fly.
+    /// Number of relays in the mission.
     all: u16,
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
-    /// Distance, in relays, of the relay to which the last request goes; 0 without a request. `is_due` is true until
-    /// the request is sent.
+    /// Distance of the relay to which the last request goes, in relays; 0 without a request. `is_due` is true until it
+    /// is sent.
     distance: u16,
     is_due: bool,
-    /// Bit mask of the relays from which a frame was received since the last request to that relay.
+    /// Bit mask of the relays received since the last request to them.
     heard: u8,
-    /// Report entries that have arrived since the last call of [`apply`](Self::apply), which gets the time.
+    /// Report entries received since the last call of [`apply`](Self::apply), which gets the time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
-    /// Newest known state of every relay that has reported, in the order of their node numbers.
+    /// Newest known state of every relay that has reported, in the order of the node numbers.
     known: heapless::Vec<KnownState, REPORTED>,
 }
 
-/// Newest known state of a relay, and the last details received. `at` is the time of this state, on the station's
-/// clock.
+/// Newest known state of a relay, and its last received details. `at` is the time of the state, on the station's clock.
 #[derive(Clone, Debug)]
 struct KnownState {
     at: Instant,
@@ -625,11 +625,11 @@ struct KnownState {
 }
 
 impl Watching {
-    /// Creates the state of a station that requests no reports. The request numbers begin at 1024 times `epoch`, so
-    /// that they rise from start to start.
+    /// Creates the state of a station that requests no reports.
     ///
-    /// After a run of more than 85 minutes, the numbers of the next run can be smaller. Relays then ignore requests
-    /// until 60 s after the last request of the earlier run.
+    /// The request numbers begin at 1024 times `epoch`, so that they rise from start to start. After a run of more than
+    /// 85 minutes, the numbers of the next run can be smaller. Relays then ignore requests until 60 s after the last
+    /// request of the earlier run.
     #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
     const fn new(epoch: u32, all: u16) -> Self {
         Self {
@@ -649,13 +649,13 @@ impl Watching {
         self.heard |= bit(distance);
     }
 
-    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The farthest comes first.
+    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The farthest is first.
     ///
     /// Returns true if that relay has sent no message since the last request to it.
     fn request(&mut self, now: Instant, reach: u16, node: u64) -> bool {
         let mut is_silent = false;
         if self.repeat_at.is_some_and(|at| at <= now) {
-            // Two stations do not request at the same time again and again.
+            // The node number keeps two stations from requesting at the same times.
             let turn = (WATCH_EVERY.as_micros() + 100_000 * (node % 7)) / u64::from(reach.max(1));
             self.repeat_at = Some(now + Duration::from_micros(turn));
             if self.distance <= 1 {
@@ -673,8 +673,8 @@ impl Watching {
         is_silent
     }
 
-    /// Schedules a repetition of the request for reports to the relay at `distance`. This relay could not verify an
-    /// earlier request.
+    /// Schedules the request for reports to the relay at `distance` again. That relay could not verify an earlier
+    /// request.
     const fn answer(&mut self, distance: u16) {
         if self.repeat_at.is_some() && !self.is_due {
             self.distance = distance;
@@ -682,8 +682,8 @@ impl Watching {
         }
     }
 
-    /// Records the entries of a report. If an entry has a node number outside the mission, records no entry and
-    /// returns false.
+    /// Records the entries of a report. Returns false, and records none, if an entry has a node number outside the
+    /// mission.
     fn record(&mut self, report: &Reports, now: Instant) -> bool {
         let (mut detail, entries) = report.states();
         if entries.iter().any(|entry| entry.relay() > self.all) {
@@ -698,8 +698,7 @@ impl Watching {
         true
     }
 
-    /// Merges the report entries that have arrived into the newest report of every relay. `now` is their arrival
-    /// time.
+    /// Merges the received report entries into the newest report of every relay. `now` is their arrival time.
     fn apply(&mut self, now: Instant) {
         for (entry, detail) in &self.arrived {
             let Some(at) = entry.time(now) else {
@@ -729,7 +728,7 @@ const fn is_under_way(progress: Progress) -> bool {
     )
 }
 
-/// Newest mission that a relay has stored, by the relay's own report.
+/// Newest mission that a relay has stored, as reported by this relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FlownMission {
@@ -740,64 +739,64 @@ pub struct FlownMission {
     /// True if the relay flies the mission now; false if it has only stored it.
     pub flies: bool,
     /// Uploaded mission with all its parameters. `None` for the mission loaded before flight, and until the relay has
-    /// sent the uploaded mission. Older firmware never sends it.
+    /// sent the upload. Older firmware never sends it.
     pub upload: Option<Upload>,
 }
 
 impl FlownMission {
-    /// Returns true once all parameters of the mission are known. Either the relay has sent the parameters, or the
-    /// relay has only the mission loaded before flight, which the station knows.
+    /// Returns true once all parameters of the mission are known. Either the relay has sent them, or it has only the
+    /// mission loaded before flight, which the station knows.
     pub const fn is_known(&self) -> bool {
         self.version == 0 || self.upload.is_some()
     }
 }
 
-/// Progress of the upload of a new mission from the ground station to the relays.
+/// Progress of a mission upload from the ground station to the relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Progress {
     /// No mission upload is in progress.
     #[default]
     Idle,
-    /// The mission is being offered; no relay has reported yet that it has stored the mission.
+    /// The mission is being offered. No relay has reported yet that it has stored it.
     Offering,
-    /// A relay has stored the mission. The ground station polls until the relays fly it.
+    /// A relay has stored the mission. The station polls until the relays fly it.
     Stored {
         /// Node number of the relay that has stored the mission.
         by: u16,
     },
-    /// A relay flies the mission, but the station does not know yet if all relays do.
+    /// A relay flies the mission. The station does not know yet if all relays do.
     Adopted {
         /// Node number of the relay that flies the mission.
         by: u16,
     },
-    /// Complete: all relays of a view (agreed members of the chain) fly the mission. Relays outside this view take no
+    /// Complete: all relays of a view (list of the chain's members) fly the mission. Relays outside this view take no
     /// part until they fly the mission, too.
     Flown {
         /// Node number of the relay that reports that all relays of its view fly the mission.
         by: u16,
-        /// Latest view (agreed members of the chain) that the reporting relay knows.
+        /// Latest view known to the reporting relay.
         view: ViewId,
-        /// Number of relays that fly the mission. These are the relay `by` and the relays of its view that are farther
-        /// from the station.
+        /// Number of relays that fly the mission. These are the relay `by`, and the relays of its view farther from the
+        /// station.
         relays: u16,
     },
-    /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the positions of Tx and
-    /// Rx, or that relay's geofence.
+    /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the Tx and Rx positions, or
+    /// that relay's geofence.
     Refused {
-        /// Node number of the relay that reports the refusal. Either this relay refuses the mission, or a relay that
-        /// is farther from the station.
+        /// Node number of the relay that reports the refusal. It refuses the mission itself, or a relay farther from
+        /// the station does.
         by: u16,
     },
-    /// The upload is outdated. A relay has stored a newer mission, or another mission with the same version.
+    /// A relay has stored a newer mission, or another mission with the same version.
     Outdated {
-        /// Version of the newer mission that the relay has stored.
+        /// Version of the mission that the relay has stored.
         version: u16,
     },
 }
 
-/// Number of interference reports after which the station repeats its handshake. Without a new handshake a restarted
-/// relay could not verify the reports.
+/// Number of interference reports after which the station repeats its handshake. Without it a restarted relay could not
+/// verify the reports.
 const REPORTS_PER_HANDSHAKE: u8 = 16;
 
 /// Last interference power measured at the station, and the relays to which it must be reported.
@@ -805,7 +804,7 @@ const REPORTS_PER_HANDSHAKE: u8 = 16;
 pub(super) struct PendingReports {
     /// Last measured interference power, W; 0 before the first measurement.
     power_w: f32,
-    /// Relays to which the last measured power must be reported, as a bit mask. Bit d - 1 is the relay at distance d.
+    /// Bit mask of the relays to which the power must be reported. Bit d - 1 is the relay at distance d.
     pending: u8,
     measurements: u8,
 }
@@ -818,8 +817,8 @@ impl PendingReports {
         measurements: 0,
     };
 
-    /// Records the interference `power_w`, W, measured at this station, to be reported to relays. The report goes to the `reach` nearest
-    /// relays. Returns true if a handshake must be sent to these relays first.
+    /// Records the measured interference `power_w`, W, to be reported to the `reach` nearest relays. Returns true if a
+    /// handshake must be sent to them first.
     pub(super) fn record(&mut self, power_w: f32, reach: u16) -> bool {
         self.power_w = power_w;
         self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));
@@ -827,8 +826,8 @@ impl PendingReports {
         self.measurements == 0
     }
 
-    /// Schedules the last measurement report once more, for the relay `distance` hops from this station. This relay has
-    /// possibly restarted and lost the report.
+    /// Schedules the last report again, for the relay at `distance`. That relay has possibly restarted and lost the
+    /// report.
     pub(super) fn schedule(&mut self, distance: u16) {
         if self.power_w > 0.0 {
             self.pending |= bit(distance);
@@ -837,8 +836,8 @@ impl PendingReports {
 
     /// Returns the next relay to which the interference must be reported, and the interference power, W.
     ///
-    /// The relay is given by its distance from the station, in relays: 1 for the nearest. Relays farther away than
-    /// `reach` are left out. `None` if no report is pending.
+    /// The relay is given by its distance in relays, 1 for the nearest. Relays farther than `reach` are left out.
+    /// `None` if no report is pending.
     pub(super) fn poll(&mut self, reach: u16) -> Option<(u16, f32)> {
         let distance = (1..=reach).find(|distance| self.pending & bit(*distance) != 0)?;
         self.pending &= !bit(distance);

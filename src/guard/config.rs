@@ -5,13 +5,13 @@ use crate::place::{CrossSection, Placement, WithoutQuorum};
 use crate::root::sqrt;
 use crate::time::Duration;
 
-/// Default of [`GuardConfig::lag`]: time to stop from the autopilot link's default speed limit.
+/// Default of [`GuardConfig::lag`]: the stopping time at the autopilot link's default speed limit.
 const LAG: Duration = Duration::from_millis(9_800);
 
 /// Maximum distance from the geofence at which a relay may start, m in each coordinate.
 pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 
-/// Geofence: the box of the allowed setpoints, in coordinates of the line from Tx to Rx.
+/// Geofence: box in which all setpoints must be. The x axis is the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geofence {
@@ -19,9 +19,9 @@ pub struct Geofence {
     pub least_x_m: f32,
     /// Upper limit of the geofence along x, m from Tx toward Rx: `least_x_m` to 1e7.
     pub most_x_m: f32,
-    /// Smallest y, m to the right of the line (negative to its left): -1e7 to `most_y_m`.
+    /// Smallest y, m to the right of the line as seen from Tx (negative: left): -1e7 to `most_y_m`.
     pub least_y_m: f32,
-    /// Largest y, m to the right of the line (negative to its left): `least_y_m` to 1e7.
+    /// Largest y, m to the right of the line as seen from Tx (negative: left): `least_y_m` to 1e7.
     pub most_y_m: f32,
     /// Lowest altitude, m above ground: -1e7 to `most_altitude_m`.
     pub least_altitude_m: f32,
@@ -42,33 +42,32 @@ impl Geofence {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
-    /// Geofence of the setpoints. A relay that starts outside returns into it; after that all its setpoints are
-    /// inside.
+    /// Geofence of the setpoints. A relay that starts outside flies into it. From then on all its setpoints are inside.
     pub geofence: Geofence,
-    /// Minimum distance between relays, m: 0 to 1e5; the same on all relays.
+    /// Minimum distance between relays, m: 0 to 1e5. The same at all relays.
     pub separation_m: f32,
-    /// Number of relays of the mission, 1 to 1000; the same on all relays.
+    /// Number of relays of the mission, 1 to 1000. The same at all relays.
     pub relays: u16,
-    /// Maximum error of a hovering relay's reported position, 0 to 1e3 m per coordinate.
+    /// Maximum position error of a hovering relay, m per coordinate: 0 to 1e3.
     ///
-    /// The separation of two relays can be smaller than `separation_m` by twice this error.
+    /// Two relays can be closer than `separation_m` by twice this error.
     pub hover_m: f32,
     /// Maximum time from `Guard::steer` until the drone flies toward the new setpoint.
     ///
-    /// The time is the latency to the flight controller plus the stopping time from maximum speed. With the autopilot
-    /// link it is [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
+    /// It is the latency to the flight controller plus the stopping time from maximum speed. With the autopilot link it
+    /// is [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
     pub lag: Duration,
 }
 
 impl GuardConfig {
-    /// Returns the configuration with the separation, distance and altitude band of a mission.
+    /// Returns the configuration with a mission's separation, distance and altitude band.
     ///
     /// The band is extended to the profile's altitude.
     ///
-    /// If relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the geofence needs
-    /// [room](Self::with_room_for) for these positions, because it limits all setpoints.
+    /// If relays leave the line Tx-Rx while they have no quorum ([`Settings::without_quorum`](crate::Settings)), the
+    /// geofence needs [room](Self::with_room_for) for these positions, because it limits all setpoints.
     ///
-    /// `hover_m` is 0 and `lag` 9.8 s, the [stopping time](crate::flight::autopilot::carrot::Pace::stopping_time) of
+    /// `hover_m` is 0 and `lag` is 9.8 s, the [stopping time](crate::flight::autopilot::carrot::Pace::stopping_time) of
     /// the default pace.
     ///
     /// ```
@@ -98,8 +97,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns this configuration with a geofence enlarged for relays that leave the line Tx-Rx. With
-    /// [`WithoutQuorum::Leave`] relays do so while they have no quorum.
+    /// Returns this configuration with a larger geofence, for relays that leave the line Tx-Rx. With
+    /// [`WithoutQuorum::Leave`] they do so while they have no quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.geofence;
@@ -142,7 +141,7 @@ impl GuardConfig {
     }
 
     /// Returns the position nearest to `place` that is no farther outside the geofence than `before`. If `before` is
-    /// inside the geofence, the result is inside as well.
+    /// inside the geofence, so is the result.
     pub(super) fn clamp_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.geofence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
@@ -160,8 +159,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns true if a relay may start at `place`: within 5 km of the geofence in each coordinate. Farther away the
-    /// coordinates would be rounded too much.
+    /// Returns true if a relay may start at `place`, at most 5 km from the geofence in each coordinate. Farther away
+    /// the coordinates would be rounded too much.
     pub(super) fn may_begin_at(&self, place: Placement) -> bool {
         let (near, box_place) = (BEGIN_WITHIN_M, self.clamp(place));
         (place.x_m - box_place.x_m).abs() <= near
@@ -169,10 +168,10 @@ impl GuardConfig {
             && (place.altitude_m - box_place.altitude_m).abs() <= near
     }
 
-    /// Returns the x to which relay `node` flies while the chain is open, m; `x_m` is its agreed x.
+    /// Returns the x to which relay `node` flies while the chain is open, m. `x_m` is its agreed x.
     ///
-    /// In an open chain all relays keep their order, and are at least the minimum separation apart along x. This
-    /// holds if all relays of the mission fit into the geofence with this separation.
+    /// In an open chain all relays keep their order and are at least the minimum separation apart along x. For this,
+    /// all relays of the mission must fit into the geofence.
     #[inline(never)] // called from several places
     pub(super) fn open_chain_x(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.geofence.least_x_m;
@@ -184,9 +183,8 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.geofence.most_x_m)
     }
 
-    /// Returns the least difference of x, m, with which two relays keep the minimum separation in space. `one` and
-    /// `other` are the lateral offsets and altitudes of the two relays. The result is 0 if these alone keep the
-    /// relays apart.
+    /// Returns the least difference in x that keeps two relays the minimum separation apart, m. `one` and `other` are
+    /// their lateral offsets and altitudes. The result is 0 if these alone keep the relays apart.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
@@ -202,7 +200,7 @@ impl GuardConfig {
 /// Maximum absolute value of a coordinate of a position, m.
 const FARTHEST_M: f32 = 1e7;
 
-/// Returns true if the coordinate `x_m` is a number within ±1e7 m.
+/// Returns true if `x_m` is a number within ±1e7 m.
 pub(super) fn is_coordinate(x_m: f32) -> bool {
     x_m.abs() <= FARTHEST_M
 }

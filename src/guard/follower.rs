@@ -1,4 +1,4 @@
-//! Fence upstream, which the neighbour places.
+//! Fence on the upstream side of this relay, set by the upstream neighbour.
 
 use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
@@ -7,34 +7,31 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Limit for the comparison of wrapping 16-bit fence numbers. A fence is newer than the last fence if the difference
-/// of their numbers, modulo 2^16, is above 0 and below this limit.
+/// Limit for the comparison of 16-bit fence numbers, which wrap around. A fence is newer if its number minus the last
+/// one, modulo 2^16, is above 0 and below this limit.
 const AHEAD: u16 = 0x8000;
 
-/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The upstream neighbour sets this
-/// fence.
+/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The upstream neighbour sets it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence (limit of x) from the neighbour upstream, 0 if there is no fence yet.
+    /// Number of the newest fence from the upstream neighbour; 0 if there is none yet.
     number: u16,
-    /// x of the newest fence that the upstream neighbour has announced, m. This relay stays beyond this x.
+    /// x of the upstream neighbour's newest fence, m. This relay's x stays above it.
     fence_m: f32,
-    /// Distance along x that the upstream neighbour asks to keep before its fence, m. Infinite until the neighbour
-    /// requests a distance.
+    /// Distance along x that the upstream neighbour wants to keep before its fence, m. Infinite until it requests one.
     requested_m: f32,
-    /// Distance along x to the upstream neighbour to which this relay has agreed, m. Infinity stands for the minimum
-    /// separation; it is the value until this relay has agreed to a distance.
+    /// Distance along x to the upstream neighbour that this relay has agreed to, m. Infinity, also the initial value,
+    /// stands for the minimum separation.
     agreed_m: f32,
-    /// x of the position that the chain has agreed on for the neighbour toward Tx, m.
+    /// x that the chain has agreed on for the upstream neighbour, m.
     target_m: f32,
-    /// Lateral offset and altitude of the setpoint of the neighbour upstream.
+    /// Lateral offset and altitude of the upstream neighbour's setpoint.
     across: CrossSection,
-    /// True once this relay is known to be past a fence of the upstream neighbour, at a larger x.
+    /// True once this relay's x is known to be above a fence of the upstream neighbour.
     clear: bool,
-    /// True once the upstream neighbour was informed that this relay is past the newest fence. The fence is a limit
-    /// of x that the upstream neighbour, its owner, has set. Past the fence means at a larger x.
+    /// True once the upstream neighbour knows that this relay's x is above the newest fence.
     owner_informed: bool,
 }
 
@@ -54,7 +51,7 @@ impl FenceFollower {
         }
     }
 
-    /// Replaces the neighbour upstream by `node`; 0 for none.
+    /// Replaces the upstream neighbour by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
             self.keep_out.mark_disordered();
@@ -63,16 +60,16 @@ impl FenceFollower {
         self.association.node = node;
     }
 
-    /// Starts a new association (session) with the neighbour upstream. The limit of x because of the previous
-    /// neighbour remains in `keep_out`. If the previous neighbour was never received, the limit is this relay's
-    /// position.
+    /// Starts a new association (session) with the upstream neighbour. The previous neighbour's limit of x remains in
+    /// `keep_out`. If that neighbour was never received, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
-            // The limit is where this relay has come to, not where it was requested to go.
+            // The limit is the x at which this relay has arrived, not the requested one.
             let limit_m = self.min_x(own).min(own.reachable.setpoint_m);
             let separation_m = own.config.separation_m;
-            // Possible shortfall, if the neighbour was allowed closer than the separation, or was never heard.
+            // Distance to be added if the neighbour was permitted to be closer than the separation, or was never
+            // received.
             let missing_m = separation_m - self.requested_m.min(self.agreed_m).min(separation_m);
             keep_out.add_lost(Side::Upstream, self.association.node, limit_m + missing_m);
             if missing_m > 0.0 {
@@ -89,8 +86,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to its setpoints, and
-    /// the limits of x do not apply to manual flight.
+    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to setpoints, so no limit
+    /// of x applies to it.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -99,8 +96,8 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association (session) because the line from Tx to Rx has changed. Lost relays remain obstacles;
-    /// drones that do not fly to setpoints are no longer obstacles.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays remain obstacles, but drones that do
+    /// not fly to setpoints do not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -109,8 +106,8 @@ impl FenceFollower {
         };
     }
 
-    /// Handles the notice that the upstream neighbour no longer flies to setpoints. This relay then comes no nearer
-    /// to this neighbour. If the two were not in the right order along x, this relay holds its position.
+    /// Handles the notice that the upstream neighbour no longer flies to setpoints. This relay comes no nearer to it.
+    /// If the two were in the wrong order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -127,7 +124,7 @@ impl FenceFollower {
         let is_placed = !fence.has_flag(Fence::LEFT) && fence.number != 0;
         self.association.receive_halt(fence, is_placed);
         self.keep_out.record_x(&self.association, fence);
-        // With a fence number the x is that of the fence, which may be far from its owner.
+        // In a message with a fence number the x is that of the fence, which may be far from the neighbour.
         if fence.has_flag(Fence::UNPLACED) || !fence.has_flag(Fence::LEFT) && fence.number == 0 {
             self.association.record_x(fence.x_m);
         }
@@ -135,7 +132,7 @@ impl FenceFollower {
             if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
-            // A relay without an association needs no reply.
+            // A relay without an association expects no reply.
             self.association.due |= !fence.has_flag(Fence::UNPLACED);
             return;
         }
@@ -148,7 +145,7 @@ impl FenceFollower {
             self.renew(own, jitter);
             self.association.peer_number = fence.association;
         }
-        // Always reply, since the message may be repeated because a reply was lost.
+        // Always reply: a message is repeated if its reply was lost.
         self.association.due = true;
         if !self.association.is_current(fence.association, fence.echo) {
             return;
@@ -168,13 +165,13 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the neighbour's agreed position; `None` before its first fence message.
+    /// Returns the upstream neighbour's agreed position; `None` before its first fence message.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         (self.number != 0).then(|| self.across.at(self.target_m))
     }
 
-    /// Returns the smallest x that is allowed for this relay, m. If this x is above the x of the current setpoint, this
-    /// relay has to fly to this x.
+    /// Returns the smallest x allowed for this relay, m. If its setpoint has a smaller x, the relay has to fly to this
+    /// x.
     #[inline(never)] // called from several places
     pub(super) fn min_x(&self, own: &Own) -> f32 {
         let granted = match (self.association.has_no_flown_neighbour(), self.number) {
@@ -185,34 +182,35 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Returns true if nothing on the upstream side forbids a change of lateral offset and altitude.
+    /// Returns true if the upstream side permits a change of lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the upstream neighbour requests a distance along x below the minimum separation. This relay
-    /// must then not change its lateral offset or altitude.
+    /// Returns true if the upstream neighbour requests less than the minimum separation along x. This relay must then
+    /// not change its lateral offset or altitude.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true while this relay and its upstream neighbour may be as close as at the start. This distance may be
-    /// below the separation. The neighbour has announced a fence (limit of x), but this relay is not known to be
-    /// beyond this fence yet.
+    /// Returns true while this relay and its upstream neighbour may be as close as at the start.
+    ///
+    /// They may be closer than the separation. The neighbour has announced a fence (limit of x), but this relay is not
+    /// known to be beyond it yet.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and its upstream neighbour violate the separation.
+    /// Returns true if the agreed positions of this relay and its upstream neighbour are too close along x.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the neighbour upstream requests, if it is large enough. This relay's two
-    /// neighbours must stay at least the separation apart: the requested distance plus `downstream_m`, the distance
-    /// to the neighbour downstream, must be at least the separation.
+    /// Agrees to the distance along x that the upstream neighbour requests, if it is large enough. Together with
+    /// `downstream_m`, the distance to the downstream neighbour, it must be at least the separation. This keeps the two
+    /// neighbours apart.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -222,7 +220,7 @@ impl FenceFollower {
     }
 
     /// Returns the least possible distance along x to the upstream neighbour, m. Infinity stands for the minimum
-    /// separation. The distance is 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
+    /// separation. 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
@@ -231,17 +229,17 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if this relay is known to be beyond its upstream neighbour along x. Also true if the upstream
-    /// neighbour does not fly to setpoints, or if the chain ends here.
+    /// Returns true if this relay is known to be beyond its upstream neighbour along x. Also true if the neighbour does
+    /// not fly to setpoints, or if the chain ends here.
     ///
-    /// A fence (limit of x) of the neighbour shows the order: the neighbour announces a fence only after it has found
-    /// this relay at a larger x. False while a lost relay may be on the wrong side.
+    /// A fence (limit of x) of the neighbour shows the order: the neighbour announces one only after it has found this
+    /// relay at a larger x. False while a lost relay may be on the wrong side.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.has_fence())
     }
 
-    /// Returns true if the neighbour upstream was reported at a larger x than this relay, the wrong order.
+    /// Returns true if the upstream neighbour was reported at a larger x than this relay (wrong order).
     ///
     /// Also true while a lost relay may be on the wrong side of this relay.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
@@ -249,14 +247,13 @@ impl FenceFollower {
             || !self.is_ordered() && self.association.is_on_wrong_side(own, Side::Upstream)
     }
 
-    /// Returns true if the neighbour upstream has announced a fence (limit of x) in this session.
+    /// Returns true if the upstream neighbour has announced a fence (limit of x) in this association.
     pub(super) const fn has_fence(&self) -> bool {
         self.number != 0
     }
 
-    /// Records that this relay is past the newest fence (limit of x), if its known position shows this. A message
-    /// must then be sent to the upstream neighbour, which waits for it. `low_m` is the lowest x of this relay and of
-    /// the relays downstream, m.
+    /// Records that this relay is beyond the newest fence (limit of x), if its known position shows this. A message to
+    /// the upstream neighbour is then due. `low_m` is the lowest x of this relay and of the relays downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -266,9 +263,8 @@ impl FenceFollower {
 
     /// Returns the highest possible x of the relays upstream during the start, m.
     ///
-    /// Until this relay is beyond the first fence (limit of x), the relays upstream may be closer than the
-    /// separation. Afterwards all relays upstream are at a smaller x than this relay, and the result is negative
-    /// infinity.
+    /// Until this relay is beyond the first fence (limit of x), these relays may be closer than the separation. After
+    /// that they are all at a smaller x than this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.has_fence() && !self.clear {
             self.fence_m - self.requested_m.min(own.config.separation_m)
@@ -277,9 +273,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. `None` if no message is
-    /// pending. If `placed` is false, the order of this relay and its neighbour downstream is not confirmed. The only
-    /// possible message is then a message with a halt request.
+    /// Returns the pending message to the upstream neighbour, with `low_m` as its x, m. `None` if none is pending. If
+    /// `placed` is false, the order of this relay and its downstream neighbour is not confirmed. The message is then
+    /// only sent to request a halt.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

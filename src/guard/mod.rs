@@ -1,83 +1,89 @@
 //! Motion guard: keeps relays apart while they fly to new agreed positions. Messages may be lost or late.
 //!
-//! Relays are in order along x. Normally neighbours are at least the minimum separation apart *along x*; then all relays are,
-//! independently of their positions across the line. Two relays whose agreed positions are beside or above each other come closer
-//! along x once both have arrived across the line; their distance across the line then counts. Two relays with one between them
-//! always stay at least the separation apart along x, so no relay needs more information than its neighbours'. Positions that do
-//! not allow that are approached as far as possible, and [`Guard::hold_reason`] reports it.
+//! Relays are in order along x. The *cross-section* of a position is its lateral offset and altitude. Normally
+//! neighbours are at least the minimum separation apart *along x*. Then all relays are, whatever their cross-sections
+//! are. Two relays whose agreed positions are beside or above each other come closer along x once both have arrived at
+//! their cross-sections, which then keep them apart. Two relays with one between them always stay at least the
+//! separation apart along x, so no relay needs more information than its neighbours'. Agreed positions that do not
+//! allow this are approached as far as possible, and [`Guard::hold_reason`] reports it.
 //!
-//! Between two neighbours there is a *fence*, a plane across x. The relay upstream of it, its *owner*, stays a *step* before it;
-//! the relay downstream, the *follower*, stays at it or beyond.
+//! Between two neighbours there is a *fence*, a plane x = constant. The relay upstream of it, its *owner*, stays a
+//! distance, the *step*, before it. The relay downstream, the *follower*, stays at it or beyond.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | [`config`] | geofence of setpoints, and other settings |
-//! | `own` | the relay's own setpoint and position across the line, and the interval along x in which it may be |
-//! | `association` | the incarnation of the neighbour that a message belongs to, and requests that relays forward |
-//! | `owner` | the fence downstream, which this relay places |
-//! | `follower` | the fence upstream, which the neighbour places |
+//! | `own` | the relay's setpoint and cross-section, and the interval along x in which it may be |
+//! | `association` | the session with a neighbour to which a message belongs, and requests that relays forward |
+//! | `owner` | the fence downstream, which this relay sets |
+//! | `follower` | the fence upstream, which the neighbour sets |
 //!
 //! # Rules
 //!
-//! *Own interval*: from the lowest to the highest x at which the relay may be, wherever it stops on its way. *In order*: the
-//! follower is beyond the owner along x. Reports have an error of up to `hover_m`. Two relays whose reports are within twice that
-//! along x are in order only if they are at least the separation apart across the line, so that they may pass each other.
+//! *Interval* of a relay: from the lowest to the highest x at which it may be, wherever it stops on its way. *In
+//! order*: the follower is beyond the owner along x. Reports have an error of up to `hover_m`. If two reports are
+//! within twice that error along x, the relays are in order only if their cross-sections are at least the separation
+//! apart, so that they may pass each other.
 //!
 //! | | rule | purpose |
 //! | --- | --- | --- |
-//! | 1 | The follower never lowers its setpoint below the newest fence received, and flies up to that fence if it is below. | its promise holds |
-//! | 2 | It reports the number of the newest fence received, and the low end of its own interval, or the x it relies on downstream (rule 3) if that is lower, because relays in order but for the error of their reports may add up. | a relay is known to be beyond all relays upstream |
-//! | 3 | The owner relies on the lowest of that low end, if reported together with the newest fence, and every fence announced since. | no message in transit lets the follower come nearer than relied on |
+//! | 1 | The follower never lowers its setpoint below the newest fence received, and flies up to that fence if it is below. | the owner can rely on its reports |
+//! | 2 | The follower reports the number of the newest fence received, and the low end of its interval. If the x that it relies on downstream (rule 3) is lower, it reports this x, because errors of the reports of relays in order may add up. | a relay is known to be beyond all relays upstream |
+//! | 3 | The owner relies on the lowest of that low end, if reported together with the newest fence, and every fence announced since. | no message in transit lets the follower come nearer than the owner relies on |
 //! | 4 | The owner never raises its setpoint to less than the step before the x it relies on. | the two intervals are the step apart |
-//! | 5 | The owner announces no fence nearer than the step beyond the high end of its own interval. | a fence that is lowered has already been cleared |
+//! | 5 | The owner announces no fence nearer than the step beyond the high end of its interval. | a fence that is lowered has already been cleared |
 //! | 6 | As far as rule 5 allows, the fence is halfway between the two agreed positions plus half the step. | both can reach their positions |
-//! | 7 | The first fence is the separation beyond the owner's own interval. Other fences, and moves across the line, start when the follower has cleared it. Until a relay has cleared the first fence upstream, it keeps room for the owner of that fence: each fence that it sends downstream is at least the separation beyond the highest x that the owner may still take. | a start that is too close is opened first, and no relay descends onto another |
-//! | 8 | The first setpoint is the last reported position, with side and altitude, even outside of the geofence. It remains until both neighbours are known to be in order: the follower has reported that it is beyond the owner, the owner has announced a fence. A relay sends a position that counts to one neighbour only while it is in order with the other one. | nothing is granted before the order is known, after a start, a reboot or a new link |
-//! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If it was never heard, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
-//! | 10 | With a fence the owner sends the step that it requests. From a step below the separation until the next one that equals it, neither moves across the line: the owner from its request on, the follower from its reception on. | the follower's reported position across the line remains valid |
-//! | 11 | The step is the separation. It becomes smaller when the follower has reported, together with the newest fence, that and where it has arrived across the line, and that it agrees. Then it is the largest of the requested step, of the distance along x that the two positions across the line still require, and of the step by rule 12. The owner announces a larger one only once it is that far before the x it relies on. | the two are the separation apart in space |
+//! | 7 | The first fence is the separation beyond the owner's interval. Other fences, and changes of cross-section, start when the follower has cleared it. Until a relay has cleared the first fence upstream, it keeps room for the owner of that fence: each fence that it sends downstream is at least the separation beyond the highest x that the owner may still take. | a start that is too close is opened first, and no relay descends onto another |
+//! | 8 | The first setpoint is the last reported position, with its cross-section, even outside of the geofence. It remains until both neighbours are known to be in order: the follower has reported that it is beyond the owner, the owner has announced a fence. A relay sends a position that counts to one neighbour only while it is in order with the other one. | nothing is granted before the order is known, after a start, a reboot or a new link |
+//! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If the neighbour was never received, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
+//! | 10 | With a fence the owner sends the step that it requests. After a step below the separation neither changes its cross-section until the next step that equals the separation: the owner from its request on, the follower from its reception on. | the follower's reported cross-section remains valid |
+//! | 11 | The step is the separation. It becomes smaller when the follower has reported, together with the newest fence, its cross-section, that it has arrived there, and that it agrees. Then it is the largest of the requested step, of the distance along x that the two cross-sections still require, and of the step by rule 12. The owner announces a larger one only once it is that far before the x it relies on. | the two are the separation apart in space |
 //! | 12 | The steps upstream and downstream of a relay add up to at least the separation: it agrees to a smaller step upstream, and takes one downstream, only as far as the sum allows. | relays that are not neighbours are the separation apart along x |
-//! | 13 | A relay that has to move across the line and may not by rule 10, or that started too close to a neighbour whose agreed position is close, requests an *open* chain on both sides, and every relay forwards the request. Then all fly to positions in the same order that are the separation apart along x, and steps are the separation. | there is room to move across the line |
-//! | 14 | From a neighbour that became silent within the separation along x this relay moves away to the separation; before, it does not move across the line, and later it does not come back nearer. The same applies if it never heard the neighbour, or had not cleared the first fence. If the neighbour was out of order with it, it holds its position. | the position of the silent relay still counts |
-//! | 15 | A relay that is not flown to its setpoints, in its pilot's hands or on the ground, has none. It leaves both associations and repeats that until the neighbour has started a new one; when flown again it begins as after a start. Meanwhile it sends its reported position, which grants nothing. Its neighbour goes no farther toward it than its own setpoint (and by rule 14 away to the separation). If the two were in order, it is otherwise free until it receives a new association, except near the last position sent: until the neighbour is flown again, linked again or forgotten, it does not pass that position along x nor come nearer to it than the separation, unless the two are the separation apart across the line, and within the separation along x it moves across the line only away from it. A relay on its way stops where it was reported. | no relay relies on a drone that is flown by hand, and none comes nearer to it or flies through it |
-//! | 16 | A relay that is out of order with a neighbour requests a *halt* of the chain; so does one that is not in order with both for three reminders, unless the positions of relays that are not flown show the order. It sends the request to both sides at every reminder, and every relay forwards it, also one that is not flown. A relay that halts on its way stops where it was last reported. A request that is not repeated for 15 reminders expires. | no relay flies into a drone that was flown again, or started, at a wrong position |
+//! | 13 | A relay requests an *open* chain on both sides if it has to change its cross-section and may not by rule 10, or if it started too close to a neighbour whose agreed position is close. Every relay forwards the request. Then all fly to positions in the same order that are the separation apart along x, and steps are the separation. | there is room to change the cross-section |
+//! | 14 | From a neighbour that became silent within the separation along x this relay moves away to the separation. Before, it does not change its cross-section, and later it does not come back nearer. The same applies if it never received the neighbour, or had not cleared the first fence. If the neighbour was out of order with it, it holds its position. | the position of the silent relay still counts |
+//! | 15 | A relay that is not flown to its setpoints, under its pilot's control or on the ground, has none. It leaves both associations, and repeats this notice until the neighbour has started a new one. When flown again, it begins as after a start. Meanwhile it sends its reported position, which grants nothing. Its neighbour goes no farther toward it than its present setpoint (and by rule 14 away to the separation). If the two were in order, it is otherwise free until it receives a new association, except near the last position sent. Until the neighbour is flown again, linked again or forgotten, it does not pass that position along x nor come nearer to it than the separation, unless the two cross-sections are the separation apart. Within the separation along x it changes its cross-section only away from it. A relay on its way stops where it was reported. | no relay relies on a drone that is flown by hand, and none comes nearer to it or flies through it |
+//! | 16 | A relay that is out of order with a neighbour requests a *halt* of the chain. So does a relay that is not in order with both neighbours for three reminders, unless the positions of relays that are not flown show the order. It sends the request to both sides at every reminder, and every relay forwards it, also one that is not flown. A relay that halts on its way stops where it was last reported. A request that is not repeated for 15 reminders expires. | no relay flies into a drone that was flown again, or started, at a wrong position |
 //!
-//! If the line changes ([`Guard::leave_line`]), a relay has no setpoint and begins as after a start, once it has stopped.
-//! Messages of a neighbour that uses another line are ignored: this relay relies on its earlier ones, and does not move before
-//! both neighbours use the new line. Relays that the new line puts out of order hold their positions.
+//! If the line from Tx to Rx changes ([`Guard::leave_line`]), a relay has no setpoint and begins as after a start, once
+//! it has stopped. Messages of a neighbour that uses another line are ignored. This relay relies on the neighbour's
+//! earlier messages, and does not move before both neighbours use the new line. Relays that the new line puts out of
+//! order hold their positions.
 //!
 //! # Why the order along x suffices
 //!
-//! Let all neighbours be in order. A pair of neighbours closer than the separation only moves apart: the owner's setpoint does
-//! not rise (rule 4) and the follower's does not fall (rules 1 and 7). From then on the pair stays at least the separation apart.
-//! So no gap between neighbours ever falls below the smaller of the separation and the gap at the start, nor does a sum of gaps,
-//! which is the distance along x of any two relays. Until both gaps of a relay are the separation, it does not move across the
-//! line. So no two relays come nearer in space than the smaller of the separation and their distance at the start, minus the
-//! errors of their positions. `cargo test --test guard anywhere` tests it.
+//! Let all neighbours be in order. A pair of neighbours closer than the separation only moves apart: the owner's
+//! setpoint does not rise (rule 4) and the follower's does not fall (rules 1 and 7). From then on the pair stays at
+//! least the separation apart. So no gap between neighbours ever falls below the smaller of the separation and the gap
+//! at the start. Nor does a sum of gaps, which is the distance along x of any two relays. Until both gaps of a relay
+//! are the separation, it does not change its cross-section. So no two relays come nearer in space than the smaller of
+//! the separation and their distance at the start, minus the errors of their positions. `cargo test --test guard
+//! anywhere` tests it.
 //!
 //! # Why all relays arrive
 //!
-//! Let the agreed positions be at least the separation apart; then so are the fences' goals. A fence that has to be lowered waits
-//! for its owner to come down, and that relay waits only for the fence upstream, if that has to be lowered too. The first of them
-//! waits for none, and so all come down, one after the other. In the same way all that have to be raised are, from the receiver's
-//! end. Then every relay finds its position between its fences. Fences move along with the flight, so that takes one flight's
-//! time and a few messages per relay at worst.
+//! Let the agreed positions be at least the separation apart; then the final fences are as well. A fence that has to be
+//! lowered waits for its owner to fly to a smaller x. That relay waits only for the fence upstream, if that has to be
+//! lowered too. The first of them waits for none, so all are lowered one after the other. In the same way all fences
+//! that have to be raised are raised, from the receiver's end. Then every relay finds its position between its fences.
+//! Fences move along with the flight, so this takes one flight's time and a few messages per relay at worst.
 //!
-//! If neighbours are to be closer along x, the same is true for the positions in an open chain, so each relay can move across the
-//! line, and none needs that again before the next agreement. Then the steps take their final values, and all arrive.
+//! If neighbours are to be closer along x, the same is true for the positions in an open chain. So each relay can
+//! change its cross-section, and none needs that again before the next agreement. Then the steps take their final
+//! values, and all arrive.
 //!
 //! # Limitations
 //!
-//! - A deviation from the reported position of up to [`GuardConfig::hover_m`] reduces the separation by as much at either relay,
-//!   and again each time that one is rebooted before a fence has restored the shortfall. Deviations across the line count if the
-//!   two are within the separation along x.
+//! - A deviation of up to [`GuardConfig::hover_m`] from the reported position reduces the separation by as much at
+//!   either relay. It does so again each time that one is rebooted before a fence has restored the shortfall.
+//!   Deviations of the cross-section count if the two are within the separation along x.
 //! - A relay sends nothing before it has both an agreed position and a report; until then no neighbour moves toward it.
-//! - The pilot is responsible for a drone in manual control. Its neighbours only come no nearer to the last position received,
-//!   which is sent every second while it changes and otherwise every four seconds. Other relays do not know it, and may fly past
-//!   it. A drone that is flown again at a wrong position stays there, and the chain halts around it; for a drone that is just
-//!   flying past this takes some seconds. A drone that is flown again in motion overshoots by its autopilot's stopping distance.
-//! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and holds its position until that one
-//!   is flown or is replaced as a neighbour.
+//! - The pilot is responsible for a drone in manual control. Its neighbours only come no nearer to the last position
+//!   received, which is sent every second while it changes and otherwise every four seconds. Other relays do not know
+//!   it, and may fly past it. A drone that is flown again at a wrong position stays there, and the chain halts around
+//!   it. For a drone that is just flying past this takes some seconds. A drone that is flown again in motion overshoots
+//!   by its autopilot's stopping distance.
+//! - A relay may start, or be flown again, beside one that is not flown and has not been received. It then holds its
+//!   position until that one is flown or is replaced as a neighbour.
 //! - A rebooted relay does not know its earlier neighbours: it has to start with those of the mission, and silent ones have to be
 //!   replaced by `set_neighbour`, so that rule 9 applies.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
@@ -112,8 +118,8 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     started_at: Instant,
-    /// Last position reported before the relay has a setpoint. This position becomes the first setpoint; `None` until
-    /// a position is reported.
+    /// Last position reported before there is a setpoint. It becomes the first setpoint. `None` until a position is
+    /// reported.
     initial_place: Option<Placement>,
     /// True while the drone flies to this guard's setpoints.
     flown: bool,
@@ -121,8 +127,8 @@ pub struct Guard {
     owner: FenceOwner,
     /// True while this relay requests a halt of the chain.
     ///
-    /// Reason: it is on the wrong side of a neighbour, or its order along x was unknown for several seconds (reminders)
-    /// in a row.
+    /// The reason is a neighbour on the wrong side, or several seconds (reminders) in a row with an unknown order along
+    /// x.
     disorder: bool,
     /// Number of seconds (reminders) in a row in which the order along x was unknown.
     unordered: u8,
@@ -130,17 +136,18 @@ pub struct Guard {
     refused: u32,
 }
 
-/// Number of seconds between two messages of a relay that does not fly to setpoints and does not move.
+/// Number of seconds between two messages of a relay that neither flies to setpoints nor moves.
 const UNFLOWN_EVERY: u8 = 4;
 
 /// Number of seconds after which an unknown order along x halts the chain.
 const MAX_UNORDERED: u8 = 3;
 
 impl Guard {
-    /// Creates a guard that starts at `now` between the mission's `neighbours`, toward Tx and toward Rx.
+    /// Creates a guard that starts at `now`. `neighbours` are the mission's neighbours toward Tx and toward Rx; `None`
+    /// is an end of the chain.
     ///
-    /// `None` in `neighbours` means an end of the chain. `config` must be valid ([`GuardConfig::is_valid`]); `seed`
-    /// must differ from relay to relay and from start to start.
+    /// `config` must be valid ([`GuardConfig::is_valid`]). `seed` must differ from relay to relay and from start to
+    /// start.
     pub fn new(config: GuardConfig, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
         let [upstream, downstream] = neighbours.map(Option::unwrap_or_default);
         let mut jitter = Jitter::new(seed);
@@ -159,7 +166,7 @@ impl Guard {
         }
     }
 
-    /// Sets the agreed position, limited to the geofence.
+    /// Sets the position that the chain has agreed on, limited to the geofence.
     pub fn commit(&mut self, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
@@ -176,7 +183,7 @@ impl Guard {
 
     /// Handles a position report of the flight controller, measured at time `at`.
     ///
-    /// The first setpoint is a reported position, measured after the start. It can be outside of the geofence, within
+    /// The first setpoint is a position reported after the start. It can be outside of the geofence, within
     /// [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
     pub fn position(&mut self, at: Instant, place: Placement) {
         if !is_placement(place) {
@@ -192,11 +199,11 @@ impl Guard {
         }
     }
 
-    /// Records if the relay flies to its setpoints from `now` on. Returns true if this is a change. `flown` is true
-    /// at the start.
+    /// Records whether the relay flies to its setpoints from `now` on (`flown`). Returns true if this is a change.
+    /// Initially true.
     ///
-    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere.
-    /// When `flown` becomes true again, the relay begins as after a start, with the next reported position.
+    /// While it is false there is no setpoint, and both neighbours are informed that the relay may be anywhere. When it
+    /// becomes true again, the relay begins as after a start, with the next reported position.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
         if flown == self.flown {
             return false;
@@ -214,9 +221,9 @@ impl Guard {
 
     /// Restarts the guard because the line from Tx to Rx has changed. Earlier positions and messages are void.
     ///
-    /// The relay begins with the first position that is reported after `now`, once the drone has stopped. With
-    /// `None`, it begins with the first position after the start. Lost relays may hover anywhere beyond this relay,
-    /// as after a start.
+    /// The relay begins with the first position reported after `now`, once the drone has stopped. With `None`, it
+    /// begins with the first position after the start. As after a start, lost relays may hover anywhere on their side
+    /// of this relay.
     pub fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(now) = now {
             self.started_at = self.started_at.max(now + self.own.config.lag);
@@ -235,10 +242,10 @@ impl Guard {
         self.own.config.geofence = fence;
     }
 
-    /// Handles a message about a fence (limit of x) from node `from`, a neighbour at `side`.
+    /// Handles a fence message (limit of x) from node `from`, a neighbour at `side`.
     ///
-    /// A message out of range is counted and ignored. A message of an earlier association (session) or of another
-    /// node is ignored.
+    /// A message out of range is counted and ignored. A message of an earlier association (session) or of another node
+    /// is ignored.
     pub fn handle_fence(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);
@@ -255,12 +262,11 @@ impl Guard {
         }
     }
 
-    /// Sets the neighbour at `side`, `None` at the end of the chain. The call has no effect if `node` is the current
-    /// neighbour.
+    /// Sets the neighbour at `side`; `None` at the end of the chain. No effect if it is the current neighbour.
     ///
-    /// The previous neighbour may still hover. This relay keeps clear of the previous neighbour until
-    /// [`forget`](Self::forget) is called, or until the previous neighbour, or a node between the two, is the neighbour
-    /// and has sent a message.
+    /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget) is called. A
+    /// message of the previous neighbour, or of a node between the two, has the same effect once that node is the
+    /// neighbour.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -276,8 +282,8 @@ impl Guard {
 
     /// Removes the obstacles of lost relays at `side`, which have landed or were removed.
     ///
-    /// `others` is true if the chain has more relays at that side. If none of these relays has been received, this
-    /// relay keeps clear of everything beyond its present x until it receives one of them.
+    /// `others` is true if the chain has more relays at that side. If none of them has been received, this relay keeps
+    /// clear of everything beyond its present x until it receives one.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         let (is_heard, limit_m, keep_out) = match side {
@@ -294,10 +300,10 @@ impl Guard {
         }
     }
 
-    /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` until there is an agreed
-    /// position and a reported position of the drone.
+    /// Moves the setpoint as far as the neighbours permit, and returns it. `None` until there is an agreed position and
+    /// a reported position of the drone.
     ///
-    /// `now` is the time at which the autopilot gets the setpoint: the drone flies toward it within
+    /// `now` is the time at which the autopilot gets the setpoint. The drone flies toward it within
     /// [`GuardConfig::lag`].
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.own.target?;
@@ -329,17 +335,19 @@ impl Guard {
         let mut least = self.follower.min_x(own);
         let mut most = self.owner.max_x(own, apart);
         if !own.has_agreed_cross_section() {
-            // A relay that has to move across the line first moves away from one that became silent nearby.
+            // A relay that has to change its lateral offset or altitude first moves away from a neighbour that became
+            // silent nearby.
             least = least.max(self.follower.keep_out.near_m());
             most = most.min(self.owner.keep_out.near_m());
         }
         let x_m = own.goal_m().max(least).min(most);
-        // Independent of requests: toward a neighbour only as far as granted, and back never beyond what was promised.
+        // Toward a neighbour only as far as that neighbour permits, and back never beyond what was promised to the
+        // other one.
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
         let moves = is_ordered && !own.halted;
         let x_m = if moves { x_m } else { before.x_m };
         let across = if clear && moves { target } else { before };
-        // A relay outside of the geofence returns as far as its limits allow, and goes no farther out.
+        // A relay outside of the geofence returns as far as its limits permit, and goes no farther out.
         let wanted = across.cross_section().at(x_m);
         let next = own.config.clamp_toward(wanted, before);
         let from = own.path_start(before);
@@ -354,7 +362,7 @@ impl Guard {
         self.own.setpoint
     }
 
-    /// Lifts the restrictions near a lost neighbour once this relay is the minimum separation away from it.
+    /// Removes the restrictions near a lost neighbour once this relay is the minimum separation away.
     fn clear_near(&mut self) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         self.follower
@@ -365,9 +373,9 @@ impl Guard {
             .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. This relay or a
-    /// neighbour may need it; a neighbour's request is forwarded to the neighbour on the opposite side. `clear` is true
-    /// if nothing forbids this relay to change its lateral offset and altitude.
+    /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. A neighbour's
+    /// request is forwarded to the other neighbour. `clear` is true if nothing forbids this relay to change its lateral
+    /// offset and altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let is_blocked = !clear && !own.has_agreed_cross_section();
@@ -388,8 +396,9 @@ impl Guard {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. This is so if one
-    /// neighbour is on the wrong side of this relay, or if the upstream neighbour is beyond the downstream neighbour.
+    /// Returns true if this relay and its neighbours are known to be in the wrong order along x.
+    ///
+    /// Either a neighbour is on the wrong side of this relay, or the upstream neighbour is beyond the downstream one.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -397,7 +406,7 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if fences (limits of x) or reported positions show this relay between its neighbours.
+    /// Returns true if fences or reported positions show that this relay is between its neighbours.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);
@@ -405,8 +414,8 @@ impl Guard {
             && (self.owner.is_ordered(own) || seen(&self.owner.association, Side::Downstream))
     }
 
-    /// Halts this relay while its order along x is not known (`is_ordered` is false), or on request. The request
-    /// comes from another relay, or from this relay if it is on the wrong side of a neighbour.
+    /// Halts this relay while its order along x is not known (`is_ordered` is false), or on request. The request comes
+    /// from another relay, or from this relay on the wrong side of a neighbour.
     fn halt(&mut self, is_ordered: bool, now: Instant) {
         self.disorder &= !is_ordered && !self.is_seen_in_order();
         self.disorder |= self.is_out_of_order();
@@ -414,7 +423,7 @@ impl Guard {
         self.own.halt(halted || !is_ordered, now);
     }
 
-    /// Forwards the halt requests of this relay and of its neighbours; returns true if there are any.
+    /// Forwards halt requests of this relay and of its neighbours. Returns true if there are any.
     fn forward_halt(&mut self) -> bool {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         let (upstream, downstream) = (up.has_halt_request(), down.has_halt_request());
@@ -428,8 +437,7 @@ impl Guard {
         self.own.setpoint
     }
 
-    /// Returns the next message to a neighbour, with the neighbour's side and node number. `None` if no message is
-    /// due.
+    /// Returns the next message to a neighbour, with its side and node number; `None` if none is due.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         for (side, association) in [(Side::Upstream, up), (Side::Downstream, down)] {
@@ -469,7 +477,7 @@ impl Guard {
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
-    /// Schedules repetitions of all messages that were possibly lost; returns true if there are any. Call it about
+    /// Schedules repetitions of all messages that were possibly lost. Returns true if there are any. Call it about
     /// every second.
     pub fn remind(&mut self) -> bool {
         let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
@@ -496,8 +504,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position and a report has shown the relay there. The agreed
-    /// position is limited to the geofence.
+    /// Returns true if the setpoint is the agreed position, and a report has shown the relay there. The agreed position
+    /// is limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
@@ -512,12 +520,11 @@ impl Guard {
         }
     }
 
-    /// Returns the reason on the given side that keeps this relay from its agreed position. `None` without such a
-    /// reason, or without an agreed position.
+    /// Returns the reason on `side` that keeps this relay from its agreed position.
     ///
-    /// Shortly after a new agreement the reason may still refer to the previous agreed positions. While the drone
-    /// does not fly to setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a
-    /// neighbour that flies to setpoints.
+    /// `None` without such a reason, or without an agreed position. Shortly after a new agreement the reason may still
+    /// refer to the previous positions. While the drone does not fly to setpoints, only [`HoldReason::Order`] is
+    /// possible: the drone is on the wrong side of a neighbour that flies to setpoints.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         if !self.flown {
@@ -550,8 +557,8 @@ impl Guard {
         }
     }
 
-    /// Returns the reason why a move toward `side` has waited for five seconds. `None` if no move has waited so long.
-    /// The reason is `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
+    /// Returns the reason why a move toward `side` has waited for five seconds; `None` if none has. It is `NotFlown` if
+    /// the neighbour does not fly to setpoints, otherwise `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {
@@ -570,7 +577,7 @@ impl Guard {
         is_held_up.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 
-    /// Returns the number of rejected inputs: not a number, or out of range. The number saturates.
+    /// Returns the number of rejected inputs (not a number, or out of range). It saturates.
     pub const fn refused(&self) -> u32 {
         self.refused
     }

@@ -1,8 +1,8 @@
 //! State of the relay itself: agreed position, setpoint and reachable positions.
 //!
-//! The reachable interval is the x at which the relay may be between its last report and its setpoints. A relay whose
-//! setpoint turns back flies on for a while, but never beyond its earlier setpoints, where it could have stopped. So it
-//! may be anywhere between its reported x and all setpoints within the [`lag`](GuardConfig::lag) before that report.
+//! The reachable interval is the x at which the relay may be between its last report and its setpoints. After its
+//! setpoint turns back, a relay first flies on, but never beyond its earlier setpoints, where it could have stopped. So
+//! it may be anywhere between its reported x and all setpoints within the [`lag`](GuardConfig::lag) before that report.
 
 use super::config::GuardConfig;
 use crate::place::{CrossSection, Placement};
@@ -31,34 +31,34 @@ impl Span {
     }
 }
 
-/// Interval of x, m, in which this relay can be. It contains the last reported x and the setpoints to which the relay
+/// Interval of x in which this relay can be, m. It contains the last reported x and the setpoints to which the relay
 /// possibly still flies.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
     pub(super) setpoint_m: f32,
     pub(super) low_m: f32,
     pub(super) high_m: f32,
-    /// Time at which the x of the drone's setpoint last changed.
+    /// Time of the last change of the setpoint's x.
     changed_at: Instant,
-    /// Interval that contains the x of all setpoints since the time `recent_since`, m.
+    /// Interval of the x of all setpoints since `recent_since`, m.
     recent_span: Span,
     recent_since: Instant,
-    /// Interval of the x of earlier setpoints, m. At the last position report the relay was possibly still on its way
-    /// to one of these setpoints.
+    /// Interval of the x of earlier setpoints, m. The relay was possibly still on its way to one of them at the last
+    /// position report.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report was measured late enough to show the effect of the first setpoint.
+    /// True once a position report is late enough to show the effect of the first setpoint.
     known: bool,
 }
 
 impl ReachableInterval {
-    /// Returns the state before the first setpoint, in which the relay's x is unknown.
+    /// Returns the state before the first setpoint, with an unknown x.
     pub(super) const fn unknown(now: Instant) -> Self {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval after the first setpoint, at `x_m`. The interval counts as unknown until a report shows the
-    /// effect of this setpoint, because the relay possibly still flies to an earlier setpoint.
+    /// Returns the interval after the first setpoint, at `x_m`. It counts as unknown until a report shows the effect of
+    /// this setpoint, because the relay possibly still flies to an earlier one.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             setpoint_m: x_m,
@@ -84,8 +84,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Extends the interval of the relay's possible x by the new setpoint `x_m`. Reason: the relay possibly first
-    /// continues toward the previous setpoint, and then turns.
+    /// Extends the interval by the new setpoint `x_m`. The relay possibly first continues toward the previous setpoint,
+    /// and then turns.
     pub(super) fn extend_to(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.setpoint_m).abs() > 0.0 {
             self.setpoint_m = x_m;
@@ -95,8 +95,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Updates the interval of the relay's possible x by a position report of time `at`. The relay is between the
-    /// reported x and its recent setpoints.
+    /// Updates the interval by a position report of time `at`. The relay is between the reported x and its recent
+    /// setpoints.
     pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
         let hovers = (x_m - self.setpoint_m).abs() <= config.hover_m + config.rounding();
         let here = Span::at(if hovers { self.setpoint_m } else { x_m });
@@ -127,33 +127,33 @@ impl ReachableInterval {
     }
 }
 
-/// Number of seconds after which a setpoint that has not moved counts as held up.
+/// Number of reminders (seconds) after which a setpoint that has not moved counts as held up.
 const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
     pub(super) config: GuardConfig,
     node: u16,
-    /// Agreed position, inside the geofence; `None` before the first agreement.
+    /// Position that the chain has agreed on, limited to the geofence; `None` before the first agreement.
     pub(super) target: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
-    /// Time at which the setpoint's lateral offset or altitude changed last.
+    /// Time of the last change of the setpoint's lateral offset or altitude.
     cross_section_changed_at: Instant,
     /// True once the relay has arrived at the setpoint's lateral offset and altitude.
     pub(super) arrived: bool,
     /// True while this relay or a neighbour requests an open chain. In an open chain all relays are at least the
     /// minimum separation apart along x.
     pub(super) open: bool,
-    /// True while this relay holds its position, because the order of relays along x is wrong or unknown.
+    /// True while this relay holds its position because the order along x is wrong or unknown.
     pub(super) halted: bool,
     pub(super) reported: Option<Placement>,
-    /// Position in the last message that was sent while the drone did not fly to setpoints.
+    /// Position in the last message sent while the drone did not fly to setpoints.
     pub(super) sent_place: Placement,
-    /// Number of seconds (reminders) since the setpoint changed last.
+    /// Number of reminders (seconds) since the last change of the setpoint.
     reminders: u8,
-    /// Last setpoint at which this relay arrived, or its first setpoint. If the relay halts on its way from this
-    /// setpoint, it stops no farther outside the geofence than this setpoint.
+    /// Last setpoint at which this relay arrived, or its first setpoint. If the relay then halts on its way, it stops
+    /// no farther outside the geofence than here.
     last_arrival: Placement,
 }
 
@@ -187,9 +187,10 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the position from which the relay's next path starts. It is `setpoint` once the relay has arrived
-    /// there. Before the arrival its x is the reported x, moved toward the x of `setpoint` by at most the error of
-    /// the report.
+    /// Returns the position from which the relay's next path starts.
+    ///
+    /// It is `setpoint` once the relay has arrived there. Before, its x is the reported x, moved toward the x of
+    /// `setpoint` by at most the error of the report.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -206,9 +207,10 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for five seconds, and `side` is a possible cause. It is a possible
-    /// cause if the agreed position is farther toward `side`, or if this side forbids a change of lateral offset or
-    /// altitude (`clear` is false).
+    /// Returns true if the setpoint has not moved for five seconds, and `side` can be the cause.
+    ///
+    /// It can be if the agreed position is farther toward `side`. It also can be if this side forbids a change of
+    /// lateral offset or altitude (`clear` is false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -221,7 +223,7 @@ impl Own {
         self.reminders >= MAX_REMINDERS_STILL && moves
     }
 
-    /// Returns true if the relay has moved away from the position in its last message under manual control.
+    /// Returns true if the relay has moved away from `sent_place`, the position in its last message.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.sent_place.cross_section())
@@ -230,8 +232,8 @@ impl Own {
         })
     }
 
-    /// Clears the setpoint and the known x. The drone no longer flies to setpoints, or the line from Tx to Rx
-    /// changes.
+    /// Clears the setpoint and the known x. Called when the drone no longer flies to setpoints, or the line from Tx to
+    /// Rx changes.
     pub(super) const fn release(&mut self, now: Instant) {
         self.setpoint = None;
         self.reachable = ReachableInterval::unknown(now);
@@ -239,8 +241,8 @@ impl Own {
         (self.open, self.halted) = (false, true);
     }
 
-    /// Starts a halt of this relay if `halted` is true, or else ends it. If the relay halts on its way, it stops at
-    /// its last reported position.
+    /// Starts (`halted` is true) or ends a halt of this relay. If the relay halts on its way, it stops at its last
+    /// reported position.
     pub(super) fn halt(&mut self, halted: bool, now: Instant) {
         let begins = halted && !self.halted;
         self.halted = halted;
@@ -265,8 +267,8 @@ impl Own {
         self.set_setpoint(place, now);
     }
 
-    /// Handles a position report, measured at time `at`. The relay has arrived at its lateral offset and altitude if
-    /// `at` is long enough after their last change.
+    /// Handles a position report, measured at time `at`. If `at` is long enough after the last change of lateral offset
+    /// and altitude, the relay has arrived there.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.arrived |= at >= self.cross_section_changed_at + self.config.lag
             && self.is_near(place.cross_section(), self.cross_section());

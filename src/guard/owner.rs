@@ -1,4 +1,4 @@
-//! Fence downstream, which this relay places.
+//! Fence on the downstream side of this relay, set by this relay.
 
 use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
@@ -7,36 +7,31 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Rx, a plane x = constant that the downstream neighbour stays beyond. This relay sets
-/// this fence.
+/// State of the fence toward Rx, a plane x = constant that the downstream neighbour stays beyond. This relay sets it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Sequence number of the newest fence sent to the neighbour downstream, 0 if no fence was sent. A fence is an x
-    /// that this neighbour must stay beyond.
+    /// Number of the newest fence sent to the downstream neighbour; 0 if none was sent.
     number: u16,
-    /// x of the newest fence that this relay has announced, m; infinite if there is none. The neighbour downstream
-    /// stays beyond this x.
+    /// x of the newest fence sent, m; infinite if there is none. The downstream neighbour's x stays above it.
     fence_m: f32,
-    /// Distance along x that this relay asks to keep before its fence, m. Infinite until this relay asks for a
-    /// distance.
+    /// Distance along x that this relay wants to keep before its fence, m; infinite until it requests one.
     requested_m: f32,
     /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed distance, or a larger
-    /// distance that was requested later. Infinity stands for the minimum separation.
+    /// one requested later. Infinity stands for the minimum separation.
     agreed_m: f32,
-    /// Lowest x that the downstream neighbour may reach, m. Negative infinity until a message of this neighbour is
-    /// received.
+    /// Lowest x that the downstream neighbour may reach, m. Negative infinity before its first message.
     follower_low_m: f32,
-    /// x of the position that the chain has agreed on for the neighbour toward Rx, m.
+    /// x that the chain has agreed on for the downstream neighbour, m.
     target_m: f32,
-    /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour has
-    /// this lateral offset and altitude.
+    /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour is
+    /// there.
     across: CrossSection,
     arrived: bool,
-    /// True if the neighbour downstream has received the newest fence (limit of x).
+    /// True if the downstream neighbour has received the newest fence.
     is_acknowledged: bool,
-    /// True once the downstream neighbour has reported that it is past a fence, at a larger x.
+    /// True once the downstream neighbour has reported that its x is above a fence.
     clear: bool,
 }
 
@@ -58,7 +53,7 @@ impl FenceOwner {
         }
     }
 
-    /// Replaces the neighbour downstream by `node`; 0 for none.
+    /// Replaces the downstream neighbour by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
             self.keep_out.mark_disordered();
@@ -67,9 +62,8 @@ impl FenceOwner {
         self.association.node = node;
     }
 
-    /// Starts a new association (session) with the neighbour downstream. The limit of x because of the previous
-    /// neighbour remains in `keep_out`. If the previous neighbour was never received, the limit is this relay's
-    /// position.
+    /// Starts a new association (session) with the downstream neighbour. The previous neighbour's limit of x remains in
+    /// `keep_out`. If that neighbour was never received, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -87,8 +81,8 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to its setpoints, and
-    /// the limits of x do not apply to manual flight.
+    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to setpoints, so no limit
+    /// of x applies to it.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -97,8 +91,8 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association (session) because the line from Tx to Rx has changed. Lost relays remain obstacles;
-    /// drones that do not fly to setpoints are no longer obstacles.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays remain obstacles, but drones that do
+    /// not fly to setpoints do not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -107,8 +101,8 @@ impl FenceOwner {
         };
     }
 
-    /// Handles the notice that the downstream neighbour no longer flies to setpoints. This relay then comes no nearer
-    /// to this neighbour. If the two were not in the right order along x, this relay holds its position.
+    /// Handles the notice that the downstream neighbour no longer flies to setpoints. This relay comes no nearer to it.
+    /// If the two were in the wrong order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -125,17 +119,18 @@ impl FenceOwner {
         self.association.peer_number != 0
     }
 
-    /// Returns true if the neighbour downstream is known to be at a larger x than this relay. Also true if this
-    /// neighbour does not fly to setpoints, or if the chain ends here.
+    /// Returns true if the downstream neighbour is known to be at a larger x than this relay. Also true if it does not
+    /// fly to setpoints, or if the chain ends here.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour()
                 || self.has_reply() && self.is_beyond(own))
     }
 
-    /// Returns true if the neighbour downstream is in the wrong order: at a smaller x than this relay. The neighbour's
-    /// last report counts, with or without an association (session). Also true while a lost relay downstream may be at
-    /// a smaller x.
+    /// Returns true if the downstream neighbour was last reported at a smaller x, the wrong order.
+    ///
+    /// Reports outside of an association (session) count, too. Also true while a lost relay downstream may be at a
+    /// smaller x.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
             true
@@ -146,13 +141,14 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the neighbour downstream is known to be at a larger x than this relay.
+    /// Returns true if the downstream neighbour is known to be at a larger x than this relay.
     ///
     /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence (limit of x), two
-    /// relays whose reports are closer than the errors along x count as in order only if lateral offset and altitude
-    /// keep them at least the separation apart. After that the neighbour counts as in order even if the reports show
-    /// the wrong order by up to twice the errors: relays in order can move by the errors when one of them halts or
-    /// restarts.
+    /// relays can be closer along x than these errors. They then count as in order only if lateral offset and altitude
+    /// keep them at least the separation apart.
+    ///
+    /// After that the neighbour counts as in order even if the reports show the wrong order by up to twice the error.
+    /// Relays in order can move by the error when one of them halts or restarts.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
@@ -164,8 +160,8 @@ impl FenceOwner {
         self.follower_low_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream can be at a smaller x
-    /// than this relay only because of the errors of the reports.
+    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream is at a smaller x than
+    /// this relay only within the errors of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.follower_low_m < low_m - 2.0 * own.config.rounding();
@@ -176,17 +172,16 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the distance along x that this relay keeps from the downstream neighbour, m. `kept_m` is the distance
-    /// to the upstream neighbour, m. The sum of both distances is at least the minimum separation, so that the two
-    /// neighbours keep this separation, too.
+    /// Returns the distance along x that this relay keeps from the downstream neighbour, m. `kept_m` is the distance to
+    /// the upstream neighbour, m. Both together are at least the minimum separation, so that the two neighbours keep
+    /// it, too.
     pub(super) fn step(&self, own: &Own, kept_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
-    /// Returns the least possible distance along x to the neighbour downstream, m. The distance is 0 near a lost
-    /// relay, and until the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the
-    /// neighbour upstream.
+    /// Returns the least possible distance along x to the downstream neighbour, m. It is 0 near a lost relay, and until
+    /// the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the upstream neighbour, m.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -196,14 +191,15 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if less than the minimum separation along x is requested or agreed to. This is about the distance
-    /// to the downstream neighbour. This neighbour must then not change its lateral offset or altitude, because
-    /// perhaps only these separate the two.
+    /// Returns true if the distance to the downstream neighbour may be less than the minimum separation.
+    ///
+    /// A smaller distance along x is requested or agreed to. The neighbour must then not change its lateral offset or
+    /// altitude, because perhaps only these keep the two apart.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
 
-    /// Returns the neighbour's agreed position; `None` before its first fence message.
+    /// Returns the downstream neighbour's agreed position; `None` before its first fence message.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         self.follower_low_m
             .is_finite()
@@ -221,7 +217,7 @@ impl FenceOwner {
             if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
-            // A relay without an association needs no reply.
+            // A relay without an association expects no reply.
             self.association.due |= !fence.has_flag(Fence::UNPLACED);
             return;
         }
@@ -258,8 +254,8 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the largest x, m, at which this relay keeps the distance `apart` from its neighbour. The neighbour is
-    /// downstream; `apart` is along x, m.
+    /// Returns the largest x at which this relay keeps the distance `apart` from its neighbour, m. The neighbour is
+    /// downstream, and the distance is along x, m.
     #[inline(never)] // called from several places
     pub(super) fn max_x(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
@@ -273,34 +269,35 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Returns true if nothing on the downstream side forbids a change of lateral offset and altitude.
+    /// Returns true if the downstream side permits a change of lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true while this relay and its downstream neighbour may be as close as at the start. This distance may
-    /// be below the separation. The neighbour has answered, but has not reported yet that it is past a fence (limit
-    /// of x).
+    /// Returns true while this relay and its downstream neighbour may be as close as at the start.
+    ///
+    /// They may be closer than the separation. The neighbour has answered, but has not reported yet that it is beyond a
+    /// fence (limit of x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and its downstream neighbour violate the separation.
+    /// Returns true if the agreed x of this relay and of its downstream neighbour are too close.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the downstream neighbour is known to be beyond the newest fence (limit of x).
+    /// Returns true if the downstream neighbour is known to be beyond the newest fence.
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
     /// Returns the smallest permitted distance along x between this relay and its downstream neighbour, m.
     ///
-    /// The result is usually the minimum separation. It is less if the agreed positions of the two relays are closer
-    /// along x, and both relays have their agreed lateral offsets and altitudes. These then keep the relays apart.
+    /// It is usually the minimum separation. It is less if the agreed positions of the two relays are closer along x.
+    /// Both must have arrived at their agreed lateral offsets and altitudes, which then keep the relays apart.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -316,18 +313,19 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the next fence for the neighbour downstream: its x, m, a distance, m, and a flag. The neighbour stays
-    /// beyond the fence, and this relay stays that distance before the fence. The flag is true if the x is final, and
-    /// false if the fence can come nearer once relays have moved. `None` if the neighbour is not known to be beyond
-    /// this relay. `kept_m` is the distance to the neighbour upstream, `upstream_m` the highest possible x of the
-    /// relays upstream, m.
+    /// Returns the next fence for the downstream neighbour: its x (m), a distance (m) and a flag. `None` if the
+    /// neighbour is not known to be beyond this relay.
+    ///
+    /// The neighbour stays beyond the fence, and this relay stays the distance before it. The flag is true if the x is
+    /// final, and false if the fence can come nearer once relays have moved. `kept_m` is the distance to the upstream
+    /// neighbour, m. `upstream_m` is the highest possible x of the relays upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
             return None;
         }
         let best = self.best_step(own);
-        // A larger step only if this relay is already that far away.
+        // The step increases only if this relay is already that far away.
         let now_m = self.follower_low_m - own.reachable.high_m + own.config.rounding();
         let step_m = if best > self.agreed_m.max(now_m) {
             self.requested_m
@@ -344,9 +342,8 @@ impl FenceOwner {
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
-    /// Schedules a message if the fence, the limit of x for the neighbour downstream, must move. If its new x is
-    /// final, the message is sent at once. If the fence can come nearer once this relay has moved, the message waits
-    /// for the next reminder.
+    /// Schedules a message if the fence (limit of x) for the downstream neighbour must move. If the new x is final, the
+    /// message is sent at once. If the fence can come nearer once this relay has moved, it waits for the next reminder.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
         if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
             let stays = last || own.reachable.has_arrived();
@@ -359,10 +356,10 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
-    /// Returns the pending Fence message to the downstream neighbour; `None` if no message is pending. A fence is
-    /// this relay's limit on the x of that neighbour. If `moves` is true, the message may contain a new fence with
-    /// the next number; otherwise it repeats the last fence. Only this function numbers fences, so that every
-    /// numbered fence is sent.
+    /// Returns the pending fence message to the downstream neighbour; `None` if none is pending.
+    ///
+    /// If `moves` is true, the message may contain a new fence with the next number. Otherwise it repeats the last
+    /// fence. Only this function numbers fences, so that every numbered fence is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

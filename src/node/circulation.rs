@@ -1,9 +1,9 @@
-//! A message that travels along the chain and whose result comes back. Stages, duplicates and retransmission.
+//! Message that travels along the chain to the last relay, and the reply with its result.
 //!
-//! View proposals, lease renewals and the passes of an agreement round all travel this way. The initiator sends a message to its neighbour
-//! and every relay forwards it. The last relay knows the result, and a reply with the result goes back through all of them. One
-//! [`Circulation`] is one relay's part in one such message. Its owner holds the payload and decides whether a received message is new, a
-//! duplicate or stale.
+//! View proposals, lease renewals and the messages of an agreement on positions all travel this way. The initiator
+//! sends a message to its neighbour, and every relay forwards it. The last relay knows the result, and a reply with the
+//! result goes back through all of them. One [`Circulation`] is the state of one relay for one such message. The
+//! calling layer stores the payload. It also classifies received messages as new, duplicate or stale.
 //!
 //! | stage | event | action | next stage |
 //! | --- | --- | --- | --- |
@@ -18,68 +18,74 @@
 //!
 //! # Timing
 //!
-//! A reply is awaited for the round trip over the remaining hops and two more; [`SLOW`] times as long if relays compute on the way. The relay
-//! next to a lost frame has the shortest timer, so one loss costs one retransmission. A timer that expires shows that the channel loses
-//! frames: this message and the next [`MEMORY`] ones are retransmitted after four hop times and then after eight, until a neighbour replies
-//! that the message is in progress. That neighbour learns of the losses by the duplicate and does the same, so that a loss costs the whole
-//! round trip once and not at every hop of a long chain. A random eighth is added to each wait, so that relays on a shared channel do not
-//! retransmit in step.
+//! A relay waits for a reply as long as the round trip over the remaining hops takes, plus two hops. It waits [`SLOW`]
+//! times as long if relays compute on the way. The relay next to a lost frame has the shortest timer, so one loss costs
+//! one retransmission.
 //!
-//! Replies are not acknowledged. On a lossy channel a reply is sent again, unasked, as many times as its number of hops has binary digits:
-//! a request for it would cost the previous relay its whole wait.
+//! A timer that expires shows that the channel loses frames. This message and the next [`MEMORY`] messages are then
+//! retransmitted after four hop times, and again after eight. The retransmissions end when a neighbour replies that the
+//! message is in progress. That neighbour recognises the losses from the duplicate, and does the same. So a loss costs
+//! the whole round trip once, and not at every hop of a long chain. A random eighth is added to each wait, so that
+//! relays on a shared channel do not retransmit at the same time.
+//!
+//! Replies are not acknowledged. On a lossy channel a reply is sent again without a request. The number of repetitions
+//! is that of the binary digits of its number of hops. Without them the previous relay would have to wait for its
+//! timer.
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays on the path first compute for long, then forward. Such frames are twice
-/// as long, and each relay needs up to thirty steps of its computation.
+/// Factor on the wait for a reply if the relays on the path compute before they forward. Such messages are twice as
+/// long, and each relay needs up to thirty steps of its computation.
 const SLOW: u32 = 4;
 
-/// Number of retransmissions after which the wait before the next retransmission no longer doubles. After n
-/// retransmissions the wait is 2 << n hop times: at most eight.
+/// Number of retransmissions after which the wait no longer doubles.
+///
+/// After n retransmissions the wait is 2 << n hop times, at most eight.
 const LOG_MOST: u32 = 2;
 
 /// Wait before the first retransmission on a lossy channel, in hop times. The next relay's acknowledgement normally
 /// arrives earlier.
 const SOON: u32 = 4;
 
-/// Number of messages after a lost message for which the channel still counts as lossy.
+/// Number of messages for which the channel still counts as lossy after a loss.
 const MEMORY: u8 = 8;
 
-/// Progress of a message that travels along the chain and back with a result, at one relay.
+/// State of one relay for a message that travels along the chain and back.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Stage {
-    /// No message is known, or this relay has not forwarded it yet.
+    /// No message is known.
     Idle,
-    /// The message has been forwarded, or is about to be; the reply with its result has not arrived yet.
+    /// The message must be forwarded or has been forwarded, and the reply has not arrived yet.
     Outstanding,
-    /// The message has circulated through the chain, and its result is known.
+    /// The result of the message is known.
     Completed,
-    /// The message was cancelled after it was sent. The relay still answers duplicates of the message, but a reply to it no longer proves
-    /// that a neighbour is alive.
+    /// The message was cancelled after it was sent.
+    ///
+    /// Duplicates of it are still answered, but a reply to it no longer proves that a neighbour is alive.
     Cancelled,
 }
 
-/// Reply to the relay from which this relay has received the message.
+/// Reply to a message from the previous relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Reply {
-    /// The message is completed; the reply contains its result.
+    /// The message is completed. The reply contains its result.
     Result,
     /// The message was received, and its result is not known yet.
     InProgress,
 }
 
-/// Path along the chain from this relay to the relay that replies to a message. The retransmission timeout follows from the path's length.
+/// Path along the chain from this relay to the relay that replies. Its length determines the retransmission timeout.
 #[derive(Clone, Copy)]
 pub(crate) struct Path {
-    /// Duration of one hop: transmission and handling of one frame.
+    /// Time to transmit and handle one frame over one hop.
     pub(crate) hop_time: Duration,
-    /// Number of hops on the message's path along the chain.
+    /// Number of hops on the path.
     pub(crate) hops: u16,
     /// True if the relays on the path compute before they forward the message.
     pub(crate) slow: bool,
 }
 
-/// State of one relay for a message that goes along the chain, and for the reply with its result.
+/// State of one relay for a message along the chain, and for the reply to it.
 #[derive(Clone, Debug)]
 pub(crate) struct Circulation {
     stage: Stage,
@@ -89,20 +95,20 @@ pub(crate) struct Circulation {
     reply_due: Option<Reply>,
     /// Number of retransmissions of the message since the next relay's last reply.
     retries: u8,
-    /// True once the next relay on the path has acknowledged the message.
+    /// True once the next relay has acknowledged the message.
     is_received: bool,
-    /// True if the channel counts as lossy: this message or one of the last messages has been lost once.
+    /// True if the channel counts as lossy, because this message or one of the last messages was lost.
     is_lossy: bool,
-    /// Number of further messages for which the channel still counts as lossy, after a lost message.
+    /// Number of further messages for which the channel still counts as lossy.
     lossy_messages: u8,
-    /// Number of times that the reply will still be repeated without a request. Reason: the channel is lossy.
+    /// Number of times that the reply is still repeated without a request, because the channel is lossy.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
 }
 
 impl Circulation {
-    /// Creates the state of a relay that has no message yet; `seed` randomises the retransmission timeouts.
+    /// Creates the state of a relay without a message. `seed` randomises the retransmission timeouts.
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             stage: Stage::Idle,
@@ -120,7 +126,7 @@ impl Circulation {
         }
     }
 
-    /// Returns the state of a message at `stage` with all times zero, for model checks without time.
+    /// Returns the state at `stage` with all times zero, for tests without time.
     #[cfg(test)]
     pub(crate) const fn at_stage(stage: Stage) -> Self {
         Self {
@@ -134,13 +140,13 @@ impl Circulation {
         self.stage
     }
 
-    /// Returns true from the forwarding of the message until the reply with its result arrives.
+    /// Returns true from the start of the message until its result is known.
     pub(crate) const fn is_outstanding(&self) -> bool {
         matches!(self.stage, Stage::Outstanding)
     }
 
-    /// Returns the time at which this relay received or created the message. `None` without a message, and after it
-    /// was cancelled.
+    /// Returns the time at which this relay received or created the message. `None` without a message, and after it was
+    /// cancelled.
     pub(crate) const fn started_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Outstanding | Stage::Completed => Some(self.started_at),
@@ -148,8 +154,8 @@ impl Circulation {
         }
     }
 
-    /// Returns the time at which the result of the message became known to this relay. `None` while the result is
-    /// unknown, and after the message was cancelled.
+    /// Returns the time at which this relay learned the result. `None` while the result is unknown, and after the
+    /// message was cancelled.
     pub(crate) const fn completed_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Completed => Some(self.completed_at),
@@ -157,7 +163,7 @@ impl Circulation {
         }
     }
 
-    /// Starts a new message at this relay: schedules its forwarding to the next relay.
+    /// Starts a new message at this relay, and schedules its transmission to the next relay.
     pub(crate) const fn start(&mut self, now: Instant) {
         self.stop(Stage::Outstanding);
         self.started_at = now;
@@ -168,8 +174,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Records the result of the message, and schedules the reply. `path` leads to the relay that started the
-    /// message. At the relay that started the message, the path has no hops, and no reply is sent.
+    /// Records that the result is known, and schedules the reply. `path` leads to the initiator of the message. At the
+    /// initiator itself the path has no hops, and no reply is sent.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -178,19 +184,20 @@ impl Circulation {
         self.repeat_reply(now, path);
     }
 
-    /// Completes the message at the relay that started it, which needs no reply.
+    /// Completes the message at its initiator, which sends no reply.
     pub(crate) const fn close(&mut self) {
         self.stop(Stage::Completed);
     }
 
-    /// Withdraws the message, as if this relay had never had it. Duplicates of the message are then not answered with
-    /// a result.
+    /// Withdraws the message, as if this relay had never received it. Duplicates are then not answered with a result.
     pub(crate) const fn withdraw(&mut self) {
         self.stop(Stage::Idle);
     }
 
-    /// Cancels the message: it counts as completed, without a result. The time of its transmission is discarded.
-    /// Otherwise a later message could be taken for the reply, and wrongly prove that a neighbour is alive.
+    /// Cancels the message: it counts as completed, without a result.
+    ///
+    /// The time of its transmission is discarded. Otherwise a later message could be taken for the reply, and wrongly
+    /// prove that a neighbour is alive.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -204,8 +211,7 @@ impl Circulation {
         self.timer = None;
     }
 
-    /// Handles a retransmission of the current message by the previous relay. `path` leads to the relay that started
-    /// the message.
+    /// Handles a retransmission of the message by the previous relay. `path` leads to the initiator of the message.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if matches!(self.stage, Stage::Completed | Stage::Cancelled) {
@@ -227,8 +233,7 @@ impl Circulation {
         self.await_result(now, path);
     }
 
-    /// Schedules a retransmission of the message if its result is still awaited. Called when the next relay is
-    /// reachable after a loss.
+    /// Schedules a retransmission if the result is still awaited. Called when the next relay is reachable again.
     pub(crate) const fn resend(&mut self) {
         self.is_forward_due |= self.is_outstanding();
     }
@@ -238,7 +243,7 @@ impl Circulation {
         core::mem::take(&mut self.is_forward_due) && self.is_outstanding()
     }
 
-    /// Starts the retransmission timer of a message forwarded at `now`. `path` leads to the last relay, which sends
+    /// Starts the retransmission timer of the message forwarded at `now`. `path` leads to the last relay, which sends
     /// the result back.
     pub(crate) fn await_result(&mut self, now: Instant, path: Path) {
         let round_trip = (2 * u32::from(path.hops) + 2) * if path.slow { SLOW } else { 1 };
@@ -271,8 +276,7 @@ impl Circulation {
         self.timer = is_left.then(|| now + self.jitter.spread(hop_time.times(SOON)));
     }
 
-    /// Schedules a retransmission or a repeated reply once the timer has expired. Returns true for a retransmission
-    /// of the message.
+    /// Schedules a retransmission or a repeated reply once the timer has expired. Returns true for a retransmission.
     pub(crate) fn handle_timeout(&mut self, now: Instant, hop_time: Duration) -> bool {
         if self.timer.is_none_or(|at| at > now) {
             return false;
@@ -308,8 +312,8 @@ pub(crate) struct LateMessages(u8);
 impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
-    /// Counts a message with an old sequence number. Returns true if it is the fourth such message in a row
-    /// ([`SUSPICIOUS`]), and then sets the count to 0.
+    /// Counts a message with an old sequence number. Returns true at the fourth such message in a row ([`SUSPICIOUS`]),
+    /// and then restarts the count.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;
@@ -348,7 +352,7 @@ mod tests {
         circulation
     }
 
-    /// Returns the time from `now` to the retransmission timeout, in hop times.
+    /// Returns the time from `now` to the next retransmission, in hop times.
     fn wait(circulation: &Circulation, now: Instant) -> u64 {
         let at = circulation.next_timeout().unwrap();
         at.since(now).as_micros() / HOP.as_micros()
@@ -410,7 +414,7 @@ mod tests {
         one.on_in_progress(START, PATH);
         one.on_duplicate(START, PATH);
         assert!(around(100).contains(&wait(&one, START)));
-        // A duplicate is no proof of a loss on the next hop.
+        // A duplicate does not prove that a frame was lost on the next hop.
         send(&mut one, START);
         assert!(around(100).contains(&wait(&one, START)));
     }

@@ -1,4 +1,4 @@
-//! State that every layer receives, effects of a layer on the others, and shared durations.
+//! State that every layer receives, effects of one layer on the others, and common durations.
 
 use crate::features::ALTITUDE;
 use crate::mission::{Band, Interference, Mission};
@@ -12,22 +12,22 @@ use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// Mission that this relay flies now, with the number of relays in the current view.
+    /// Mission that this relay flies now. It has as many relays as the current view has members.
     pub(crate) mission: Mission,
-    /// Interference as the active mission configures it, before any estimate from measurements.
+    /// Interference as configured in the active mission, before any estimate from measurements.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
     /// Node number of this relay: 1 is the relay next to Tx.
     pub(crate) node: u16,
-    /// Number of relays of the mission as loaded before flight.
+    /// Number of relays in the mission loaded before flight.
     pub(crate) all: u16,
-    /// Digest (16-bit checksum) of the mission that was loaded before flight.
+    /// Digest (16-bit checksum) of the mission loaded before flight.
     pub(crate) digest: u16,
     /// Identifier of the mission that this relay flies now.
     pub(crate) active: MissionId,
-    /// Identifier of the view that this relay accepted last. A view is an agreed membership of the chain.
+    /// Identifier of the view that this relay accepted last. A view is the agreed list of the chain's members.
     pub(crate) view: ViewId,
-    /// Index of this relay among the members of the view: 1 for the member next to Tx.
+    /// Index of this relay among the members of the view, counted from 1 at Tx.
     pub(crate) index: u16,
 }
 
@@ -47,8 +47,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank and the number of relays in the mission as loaded before flight. Rank 1 is at the
-    /// leader's end. View changes (of the chain's members) alter neither number.
+    /// Returns this relay's rank, and the number of relays in the mission loaded before flight. Rank 1 is the leader.
+    /// View changes alter neither number.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -57,8 +57,8 @@ impl Member {
         (place, self.all)
     }
 
-    /// Returns the digest that every message of a pass along the chain contains. The digest identifies the active
-    /// mission and the accepted view (agreed members of the chain).
+    /// Returns the digest of the active mission and the accepted view. Every message of an agreement on positions
+    /// contains it.
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
     }
@@ -69,11 +69,12 @@ impl Member {
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// Identifier of the newest mission that this relay has stored. The active mission can still be an older mission.
+    /// Identifier of the newest mission that this relay has stored. It can be newer than the active mission.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last of its chain: it has no neighbour on the side away from the leader.
+    /// True if this relay has no neighbour on the side away from the leader, so that it is the last one.
     pub(crate) end: bool,
-    /// Remaining lease times of other relays. Until they have ended, the positions of a new view must not be used.
+    /// Remaining lease times of other relays. The positions of a new view must not be used before these leases have
+    /// ended.
     pub(crate) other_leases: OtherLeases,
 }
 
@@ -94,9 +95,10 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. This is so if the
-    /// settings select the joint method, and the mission leaves the lateral offset or the altitude free, or has fitted
-    /// slots (time slots that are as long as each hop needs).
+    /// Returns true if every relay itself computes the positions of the whole chain (joint method).
+    ///
+    /// The settings must select the joint method. The mission must leave the lateral offset or the altitude free, or
+    /// have fitted slots. Fitted slots are time slots that are as long as each hop needs.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
@@ -104,8 +106,7 @@ impl<'a> Context<'a> {
         ALTITUDE && self.settings().method == Method::Joint && free
     }
 
-    /// Returns the maximum duration of a lease, in tenths of a second. A lease permits the use of the agreed
-    /// positions.
+    /// Returns the maximum duration of a lease, in tenths of a second.
     pub(crate) fn longest_lease(&self) -> u16 {
         tenths(longest_lease(self.settings()))
     }
@@ -118,7 +119,6 @@ impl<'a> Context<'a> {
         self.mission().after(self.index()).is_none()
     }
 
-    /// Returns the path from this relay to the last relay of the view: number and duration of its hops.
     pub(crate) fn path_to_last(&self) -> Path {
         let mission = self.mission();
         self.path(match mission.heading() {
@@ -127,7 +127,6 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Returns the path from this relay to the leader: number and duration of its hops.
     pub(crate) fn path_to_leader(&self) -> Path {
         let relays = self.mission().relays();
         self.path(
@@ -151,8 +150,8 @@ impl<'a> Context<'a> {
         (0.0..=self.mission().config().distance_m).contains(&place.x_m)
     }
 
-    /// Returns the range of altitudes that this relay may take, m. The range has the single value `altitude_m` if the
-    /// relay keeps a fixed altitude.
+    /// Returns the range of altitudes that this relay may use, m. If its altitude is fixed, the range is the single
+    /// value `altitude_m`.
     pub(crate) fn band(&self, altitude_m: f32) -> Band {
         if self.settings().hold_altitude {
             Band::at(altitude_m)
@@ -162,17 +161,17 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Remaining lease times of other relays, as far as this relay knows. A lease permits a relay to use the agreed
+/// Remaining lease times of other relays, as far as this relay knows. During its lease a relay may use the agreed
 /// positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Upper bound of the remaining lease time of the other members of this relay's view. The bound is known because
-    /// every lease renewal also passes this relay.
+    /// Upper bound of the remaining lease time of the other members of this view. It is known because every lease
+    /// renewal also passes through this relay.
     pub(crate) lease_left: Duration,
-    /// Last accepted view (agreed members of the chain).
+    /// View that this relay accepted last.
     pub(crate) view: ViewId,
-    /// Longest remaining lease time granted in an earlier view than `view`. `None` if unknown, because a member has
-    /// possibly not accepted `view`.
+    /// Longest remaining lease time from a view before `view`. `None` if unknown, because a member has possibly not
+    /// accepted `view`.
     pub(crate) earlier_lease_left: Option<Duration>,
 }
 
@@ -184,8 +183,8 @@ impl OtherLeases {
         earlier_lease_left: Some(Duration::from_micros(0)),
     };
 
-    /// Returns the time until all leases of earlier views than `view` have ended, in tenths of a second. `u16::MAX`
-    /// if unknown. A lease permits a relay to use the agreed positions of its view.
+    /// Returns the time until all leases of views before `view` have ended, in tenths of a second. `u16::MAX` if
+    /// unknown.
     pub(crate) fn earlier_lease_tenths(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
@@ -196,7 +195,7 @@ impl OtherLeases {
     }
 }
 
-/// Results of one protocol layer's step that other layers or the firmware need.
+/// Results of one protocol layer's step, for the other layers and the firmware.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is one thing that happened or did not"
@@ -207,19 +206,19 @@ pub(crate) struct Effects {
     pub(crate) ignored: Option<Ignored>,
     /// True if this step scheduled a retransmission of a message.
     pub(crate) resent: bool,
-    /// True if, in this step, this relay has started a pass (message along the chain) or a view proposal.
+    /// True if this step started a message along the chain or a view proposal.
     pub(crate) began: bool,
-    /// True if the relays must agree on a new view (membership of the chain).
+    /// True if the relays must agree on a new view (list of the chain's members).
     pub(crate) view_needed: bool,
-    /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
-    /// proves that the neighbour was alive after that time. `None` without a reply.
+    /// Neighbour that has replied to a message, and the time at which that message was sent. The reply proves that the
+    /// neighbour was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the view proposal that this relay has received or made in this step. `None` without a proposal.
+    /// Origin of the view proposal received or made in this step; `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
-    /// True while a view proposal awaits its decision. During this time no pass (message along the chain) continues.
+    /// True while a view proposal awaits its decision. The relays then forward no other message along the chain.
     pub(crate) view_proposed: bool,
     pub(crate) event: Option<LayerEvent>,
-    /// Changes of the interference estimate and of the set of faulty interference sensors.
+    /// Changes of the interference estimate and of the list of faulty interference sensors.
     pub(crate) sensed: Sensed,
 }
 
@@ -230,51 +229,51 @@ pub(crate) enum Ignored {
     Duplicate,
 }
 
-/// Neighbour of a relay: the previous or the next relay. The order is from the leader to the last relay.
+/// Previous or next relay. The order is from the leader to the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Peer {
     Next,
     Previous,
 }
 
-/// Result of one protocol layer that other layers or the firmware handle as an event.
+/// Result of one protocol layer that is handled as an event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
     /// The relays of the chain have all agreed on their positions.
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
-    /// The lease has expired: this relay is no longer allowed to use the agreed positions.
+    /// The lease has expired, so a later view may already have other positions.
     Lapsed,
-    /// A hello that requests a new view must be sent to the neighbour toward the leader.
+    /// A hello to the neighbour toward the leader must request a new view.
     RequestView,
-    /// A proposal of a view (membership of the chain) has been decided.
+    /// A view proposal has been decided.
     ProposalDecided(ProposalOutcome),
 }
 
-/// Changes of the sensing results after a new measurement or sensing pass. The node applies a changed interference
-/// estimate, and reports the other changes to the firmware.
+/// Changes of the interference estimate and of the faulty sensors after a new measurement.
+///
+/// The node uses a changed estimate, and reports the other changes to the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sensed {
     /// True if the interference estimate has changed.
     pub(crate) new_estimate: bool,
     /// True if no single interferer explains the measurements.
     pub(crate) unclear: bool,
-    /// Node whose measurements were found, in this step, to contradict the measurements of the other nodes. `None`
-    /// without such a finding.
+    /// Node whose measurements contradict those of the other nodes, found in this step. `None` without such a finding.
     pub(crate) faulty_sensor: Option<u16>,
 }
 
 /// Decision on a view proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum ProposalOutcome {
-    /// Accepted: the view has `relays` members. Its positions may be used after `usable_in` tenths of a second, when
-    /// older leases have ended.
+    /// Accepted: the view has `relays` members.
+    ///
+    /// Its positions may be used after `usable_in` tenths of a second, when older leases have ended.
     Granted { relays: u16, usable_in: u16 },
-    /// Superseded: another view was decided earlier and is accepted instead. The leader then proposes a view that
-    /// follows this other view.
+    /// Another view was decided earlier and is accepted instead. The leader then proposes a view that follows it.
     Superseded,
-    /// Rejected: fewer relays are reachable than a quorum needs.
+    /// Rejected: too few relays are reachable for a quorum.
     NoQuorum,
 }
 
@@ -312,8 +311,8 @@ impl Effects {
         ..Self::NONE
     };
 
-    /// Effects of a message of a view (membership) to which this relay does not belong. The message is ignored, and a
-    /// new view is requested.
+    /// Effects of a message from a view to which this relay does not belong. The message is ignored, and a new view is
+    /// requested.
     pub(crate) const FOREIGN: Self = Self {
         view_needed: true,
         ..Self::STALE
@@ -326,7 +325,7 @@ impl Effects {
         }
     }
 
-    /// Returns these effects with `proposer` recorded as the origin of the view proposal.
+    /// Returns these effects with `proposer` as the origin of the view proposal.
     pub(crate) const fn by(self, proposer: Proposer) -> Self {
         Self {
             proposed_by: Some(proposer),
@@ -335,20 +334,18 @@ impl Effects {
     }
 }
 
-/// Pause between two steps of a long computation, in which the firmware's main loop can do other work.
+/// Pause between two steps of a long computation. The firmware's main loop can do other work in it.
 pub(crate) const PAUSE: Duration = Duration::from_micros(250);
 
-/// Maximum duration of a lease, as a multiple of the setting `dead_after`. A lease permits the use of the agreed
-/// positions.
+/// Maximum duration of a lease, in units of `dead_after`.
 const MAX_LEASE: u32 = 8;
 
-/// Returns the maximum duration of a lease (permission to use the agreed positions).
 pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the maximum time from the leader's first message along the chain until the result is back. The time is for
-/// a chain of `all` relays that loses half of its frames.
+/// Returns the maximum time from the leader's first message along the chain until the result is back. It holds for a
+/// chain of `all` relays that loses half of its frames.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

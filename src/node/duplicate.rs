@@ -1,11 +1,14 @@
 //! Duplicate index: another node uses this relay's node number. At most one of the two may have a setpoint.
 //!
-//! Each start has a 30-bit *claim number*, drawn from the seed of `Relay::new`. Without a key it is sent in a Claim message to a
-//! neighbour; the other node with this index receives the claim directly, or as the neighbour's echo. A claim names the claim
-//! number that its sender has received last: only a claim that names this relay's number is known to have been sent after this
-//! relay's start. With a key, the lower half of the nonces starts at the claim number: handshakes carry it, and neighbours show
-//! the largest nonce that they have received. The larger epoch makes the larger claim, then the larger claim number. A relay is
-//! *active* or *passive*: a passive relay has no setpoint, takes part in nothing and sends only claims.
+//! Each start has a 30-bit *claim number*, drawn from the seed of `Relay::new`. Two nodes with one number compare their
+//! claims. The larger epoch makes the larger claim. With equal epochs it is the larger claim number. A relay is
+//! *active* or *passive*. A passive relay has no setpoint, takes no part in the protocol, and sends only claims.
+//!
+//! Without a key the claim number is sent in a Claim message to a neighbour. The other node with this index receives
+//! the claim directly, or as the neighbour's echo. A claim also contains the claim number that its sender has received
+//! last. Only a claim that contains this relay's number is known to have been sent after this relay's start. With a
+//! key, the lower half of the nonces starts at the claim number. Handshakes contain this nonce, and neighbours show the
+//! largest nonce that they have received.
 //!
 //! | state | event | action | next state |
 //! | --- | --- | --- | --- |
@@ -50,21 +53,21 @@ use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 use crate::wire::session::{RAISED, Rival, Sender};
 
-/// Wait before the first claim that this relay sends without a request. A claim is a message by which two nodes with
-/// one node number detect each other. The intervals between later claims double each time.
+/// Wait before the first claim that this relay sends without a request. The intervals between later claims double.
+///
+/// Claims let two nodes with one node number detect each other.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time added, after a start, before the first claim that this relay sends without a request. This is about the time
-/// that a hundred relays need for their first agreement. A relay that was passive and becomes active waits for the same
-/// time.
+/// Time added before the first claim without a request, after a start or after the relay was passive. A hundred relays
+/// need about this time for their first agreement.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum interval between claims that this relay sends without a request. The interval doubles up to this value;
-/// after that a claim follows every `dead_after`.
+/// Maximum interval that results from doubling the interval between claims without a request. After it, a claim follows
+/// every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims by which this relay defends its node number against another node's claim. The interval between
-/// these claims is [`least_interval`].
+/// Number of claims that this relay sends in answer to another node's claim. The interval between them is
+/// [`least_interval`].
 const DEFENCES: u8 = 32;
 
 /// Number of claims that this relay sends after a frame with its own node number but without a claim.
@@ -72,13 +75,13 @@ const DEFENCES: u8 = 32;
 /// With signed frames: number of claims that this relay sends after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
 
-/// Returns the minimum interval between claims of this relay. The claims of two relays and their echoes then do not
-/// fill the channel.
+/// Returns the minimum interval between claims of this relay. It keeps the claims of two relays and their echoes from
+/// filling the channel.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Returns the interval between claims of a passive relay, a quarter of `probe_after`. A passive relay sends many
+/// Returns the interval between claims of a passive relay: a quarter of `probe_after`. A passive relay sends many
 /// claims before it becomes active again, so the loss of some does no harm.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
@@ -88,34 +91,32 @@ const fn passive_interval(settings: &Settings) -> Duration {
 #[derive(Clone, Debug)]
 pub(crate) struct IndexClaims {
     number: u32,
-    /// Largest claim number received from another node with this relay's node number and epoch. Of two such nodes, the
-    /// node with the smaller claim number becomes passive.
+    /// Largest claim number received from another node with this relay's node number and epoch. The node with the
+    /// smaller claim number becomes passive.
     rival: u32,
     /// Last claim number received from another node with this relay's node number; 0 if there is none.
     last_rival: u32,
-    /// Time of the last frame from another node with this relay's node number, and a flag. The flag is true if this
-    /// relay already had a position at the first such frame. `None` without such a frame.
+    /// Time of the last frame from another node with this relay's number. The flag is true if this relay already had a
+    /// position at the first such frame. `None` without such a frame.
     contest: Option<(Instant, bool)>,
-    /// Times at which two nodes were last seen to use one number. Entry 0 is for this relay's number, entry 1 for a
-    /// neighbour's number; `None` for never.
+    /// Times at which two nodes were last received with one number; `None` for never. Entry 0: this relay's number.
+    /// Entry 1: a neighbour's number.
     observed: [Option<Instant>; 2],
     /// Time at which this relay last received one of its own frames; `None` if none has been received.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while this relay is active.
     passive_until: Option<Instant>,
-    /// Time of the next claim that this relay sends without a request, not in reply to a frame. `None` if none is
-    /// scheduled.
+    /// Time of the next claim that is sent without a request; `None` if none is scheduled.
     next_claim: Option<Instant>,
-    /// Time from the next claim without a request to the claim after it.
+    /// Interval between the next claim without a request and the claim after it.
     interval: Duration,
-    /// Number of claims still to be sent in defence of this relay's node number. The interval between these claims is
+    /// Number of claims still to be sent to defend this relay's node number. The interval between them is
     /// [`least_interval`].
     defences: u8,
-    /// Earliest time at which a further claim to this relay's node number may be scheduled. This limits the rate of
-    /// Claim messages.
+    /// Earliest time at which another claim may be scheduled. This limits the rate of Claim messages.
     quiet_until: Instant,
     claim_due: bool,
-    /// True if all authentication sessions must be restarted with this relay's new claim number.
+    /// True if all authentication sessions must be restarted, because the claim number has changed.
     sessions_due: bool,
     jitter: Jitter,
 }
@@ -155,8 +156,8 @@ impl IndexClaims {
         self.number
     }
 
-    /// Records that two nodes use the same number. Returns true if this must be reported: it was not observed within
-    /// the last two periods of `dead_after`.
+    /// Records that two nodes use the same number. Returns true if this must be reported, because it was not observed
+    /// within the last two periods of `dead_after`.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -172,16 +173,17 @@ impl IndexClaims {
         since.is_none_or(|since| since > settings.dead_after.times(2))
     }
 
-    /// Returns true if another node with this relay's number was received recently. Recently means within the last
-    /// three periods of `dead_after`.
+    /// Returns true if another node with this relay's number was received recently.
     ///
-    /// Reason for three periods: a node that was passive sends claims again after up to 2.25 periods.
+    /// Recently means within the last three periods of `dead_after`.
+    ///
+    /// A node that was passive sends claims again after up to 2.25 periods, so two periods are too short.
     pub(crate) fn is_observed(&self, now: Instant, settings: &Settings) -> bool {
         let [own, _] = self.observed;
         own.is_some_and(|at| now.since(at) < settings.dead_after.times(3))
     }
 
-    /// Returns the sender of `claim`, a claim to this relay's node number: this relay or another node.
+    /// Returns the sender of a claim to this relay's node number: this relay or another node.
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
         if claim.number | RAISED == self.number | RAISED {
             return Sender::Itself;
@@ -198,8 +200,8 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease now, and had
-    /// one at the first such frame.
+    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease now and had one
+    /// at the first such frame.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -208,8 +210,8 @@ impl IndexClaims {
         held && has_lease
     }
 
-    /// Handles a frame that bears this relay's own node number as its sender. Returns true if this relay becomes
-    /// passive. `has_lease` is true if this relay has a setpoint and a lease.
+    /// Handles a frame whose sender has this relay's node number. Returns true if this relay becomes passive.
+    /// `has_lease` is true if this relay has a setpoint and a lease.
     pub(crate) fn handle_frame(
         &mut self,
         now: Instant,
@@ -238,8 +240,8 @@ impl IndexClaims {
         false
     }
 
-    /// Compares another node's claim to this relay's number with this relay's own claim. Returns true if this relay
-    /// becomes passive.
+    /// Compares another node's claim to this relay's number with this relay's claim. Returns true if this relay becomes
+    /// passive.
     fn compare(
         &mut self,
         now: Instant,
@@ -269,7 +271,7 @@ impl IndexClaims {
             self.sessions_due = true;
             self.defend(now, rival, settings);
             if settings.auth.is_some() {
-                // A replayed frame does not have this effect again.
+                // A replayed frame must not cause claims again.
                 self.defences = REPEATED_CLAIMS;
                 self.schedule_unprompted(now, settings);
             }
@@ -290,8 +292,8 @@ impl IndexClaims {
         }
     }
 
-    /// Schedules claims in answer to the claim `rival` of another node to this relay's number. The claims are
-    /// repeated for some seconds, or until the other node is passive. With signed frames only one claim is sent.
+    /// Schedules claims in answer to another node's claim `rival` to this relay's number. They are repeated for some
+    /// seconds, or until the other node is passive. With signed frames only one claim is sent.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {
@@ -307,9 +309,9 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts periodic claims to this relay's node number. Periodic claims are necessary on point-to-point links
-    /// without a key, and against another active node. On a shared channel a relay receives the frames of such a node
-    /// directly.
+    /// Starts periodic claims, on links without a key or while this relay defends its node number.
+    ///
+    /// On a shared channel a relay receives the frames of a duplicate directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -326,9 +328,8 @@ impl IndexClaims {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns this relay's claim number if it must restart its authentication sessions; otherwise `None`. Of two
-    /// nodes with the same node number, the larger claim number wins. A relay that has raised its claim number
-    /// restarts its sessions with the new number.
+    /// Returns this relay's claim number if it must restart its authentication sessions; otherwise `None`. A relay that
+    /// has raised its claim number restarts its sessions with the new number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }
@@ -414,8 +415,7 @@ mod tests {
         }
     }
 
-    /// Checks that a claim that names an older claim number of this relay is only answered. Such a claim was sent
-    /// before the relay's last start.
+    /// Checks that a claim from before this relay's last start is answered and has no other effect.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
@@ -434,7 +434,7 @@ mod tests {
                 (duplicate.number(), duplicate.other_number()),
                 (own, own + 9)
             );
-            // Its sender is present and answers.
+            // The other node is present and answers.
             let answer = Claim {
                 other_number: own,
                 ..before
@@ -485,8 +485,8 @@ mod tests {
         }
     }
 
-    /// Checks that a relay raises its claim number only if it had a position before it met its duplicate. After 40 s
-    /// of silence the next contact counts as the first one.
+    /// Checks that a relay raises its claim number only if it had a position before it met its duplicate. After 40 s of
+    /// silence the next frame counts as the first one.
     #[test]
     fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();
@@ -581,8 +581,8 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// Checks that a relay repeats its claim to its number for 4 s after a claim of an active duplicate. It stops
-    /// early once the duplicate is passive.
+    /// Checks that a relay repeats its claim for 4 s after a claim of an active duplicate. It stops early once the
+    /// duplicate is passive.
     #[test]
     fn an_index_is_defended_for_4_s_or_until_the_other_is_passive() {
         let settings = Settings::default();
@@ -616,7 +616,7 @@ mod tests {
         assert!(duplicate.handle_frame(at(0), Sender::Rival(larger), false, &settings));
         assert!(!duplicate.handle_frame(at(20), Sender::Unknown, false, &settings));
         assert!(!duplicate.handle_frame(at(40), Sender::Rival(larger), false, &settings));
-        // A passive node keeps no other node passive.
+        // The claim of a passive node does not keep another node passive.
         let passive = Rival {
             passive: true,
             ..larger

@@ -1,8 +1,8 @@
-//! Watches and Reports in a build without the feature `telemetry`: handed on, and not stored.
+//! Telemetry messages in a build without the feature `telemetry`: forwarded, not stored.
 //!
-//! Only the last one is kept until it can be sent to the other neighbour.
+//! Only the last message (`Watch` or `Report`) is kept, until it can be sent to the other neighbour.
 //!
-//! Without the feature `auth` there is nothing to hand on, because ground stations sign all frames.
+//! Without the feature `auth` nothing is forwarded, because ground stations sign all frames.
 
 #![expect(
     clippy::unused_self,

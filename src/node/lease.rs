@@ -1,9 +1,11 @@
-//! Lease: how long, by its own clock, a relay knows that no later view has positions.
+//! Lease: time during which a relay knows that no later view has positions.
 //!
-//! The part of a split chain that has a quorum agrees on new positions only once the leases of all other members have expired. So a
-//! relay with a lease knows that the positions of its own view are the only ones. After the first agreement the leader sends renewals: a `Pulse` message is forwarded to the last relay, the reply
-//! `Pulsed` travels back, and only then the next renewal is sent. Renewal n + 1 therefore proves that every member took part in
-//! renewal n, and extends the lease.
+//! A split chain agrees on new positions only in the part that has a quorum. Before that, the leases of all other
+//! members must have expired. So a relay with a lease knows that the positions of its own view are the only ones.
+//!
+//! After the first agreement the leader sends renewals. A `Pulse` message is forwarded to the last relay, and the reply
+//! `Pulsed` travels back. Only then the next renewal is sent. Renewal n + 1 therefore proves that every member took
+//! part in renewal n, and extends the lease.
 //!
 //! | role | event | action |
 //! | --- | --- | --- |
@@ -53,7 +55,7 @@ use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// No lease yet. Either this view has no agreement, or it is unknown if all members know the agreement.
+    /// No lease yet: nothing is agreed on in this view, or some members possibly do not know the agreement.
     Pending,
     Until(Instant),
     Lapsed,
@@ -71,41 +73,41 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Latest possible end of another member's lease that is based on this relay's part in a renewal.
+    /// Latest possible end of another member's lease that rests on this relay's part in a renewal.
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which positions agreed on in it may be used.
     accepted: (ViewId, Instant),
-    /// Latest possible expiry of the leases granted before the accepted view; `None` if it is unknown.
+    /// Latest time at which a lease from before the accepted view can end; `None` if unknown.
     older_leases_end: Option<Instant>,
-    /// True once this relay knows that all members have accepted the view. A completed lease renewal proves it, too,
-    /// because every member has to take part in it.
+    /// True once this relay knows that all members have accepted the view. Every completed lease renewal proves it,
+    /// because every member takes part in it.
     is_whole: bool,
     /// True once this relay has agreed on its position in this view.
     is_agreed: bool,
     /// Time at which the leader starts the next lease renewal; `None` if none is due.
     next_at: Option<Instant>,
-    /// Slowly decaying maximum of recent round trips of lease renewals through the chain.
+    /// Maximum round trip of recent lease renewals. It decays slowly.
     round_trip: Duration,
     circulation: Circulation,
     /// Orders of the leader in the last renewal of this view.
     orders: Orders,
-    /// Requests collected by the last completed renewal of this view, from the last relay to this relay. `None` until
-    /// a renewal is completed.
+    /// Requests from this relay and the relays after it, as collected by the last completed renewal. `None` until a
+    /// renewal is completed.
     requests: Option<Requests>,
     /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
     departures: [Departures; DEPARTURES as usize],
 }
 
-/// Requests of this relay, and its knowledge of departures as the leader.
+/// Requests of this relay. At the leader also the state of departures from the chain.
 #[derive(Clone, Copy, Debug)]
 struct Departures {
     requests: Requests,
-    /// Number of relays that the view had when no relay requested to leave.
+    /// Number of relays in the view when no relay requested to leave.
     complement: u16,
-    /// Relay that requests to leave, 0 for none, and the time of its first request. Requests in earlier views count,
-    /// too.
+    /// Relay that requests to leave (0 for none), and the time of its first request. It may be a request in an earlier
+    /// view.
     leaver: (u16, Instant),
-    /// Time of the first renewal of this view: all relays then had new positions.
+    /// Time of the agreement on positions in this view, as seen by the leader.
     settled_at: Instant,
 }
 
@@ -114,9 +116,8 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// Creates the lease state of a relay that starts at `now`. Before a restart the relay has possibly taken part in a
-    /// lease renewal. So other relays can still have a lease for up to `dead_after`, which this relay does not
-    /// remember.
+    /// Creates the lease state of a relay that starts at `now`. After a restart, other relays can still have a lease
+    /// for up to `dead_after`, which this relay does not remember.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Pending,
@@ -140,14 +141,13 @@ impl Lease {
         }
     }
 
-    /// Sets the requests of this relay to the leader: departure, spare, arrival at its position.
+    /// Sets this relay's requests to the leader: to leave, its spare, and if it is in place.
     pub(crate) fn set_requests(&mut self, requests: Requests) {
         if let Some(departures) = self.departures.first_mut() {
             departures.requests = requests;
         }
     }
 
-    /// Returns the leader's last orders in this view.
     pub(crate) const fn orders(&self) -> Orders {
         self.orders
     }
@@ -159,11 +159,13 @@ impl Lease {
 
     /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
-    /// A relay is ordered to leave once all relays were in place in two consecutive renewals. The relay that left
-    /// before it has then received this information. If there is a spare, the spare joins first, unless a spare has
-    /// joined already: the view then has more relays than before the request. A relay that does not arrive counts as in
-    /// place after half of the maximum duration of a lease. No relay waits for the order longer than this maximum
-    /// duration, or than its remaining endurance. So at least half of the endurance at the first request remains.
+    /// A relay is ordered to leave once two consecutive renewals reported all relays in place. By then the relay that
+    /// left before it has received this report. If there is a spare, the spare joins first. No spare is called if the
+    /// view already has more relays than before the request.
+    ///
+    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease. No relay waits
+    /// for the order longer than this maximum duration, or than its remaining endurance. So at least half of the
+    /// endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -198,8 +200,8 @@ impl Lease {
         orders
     }
 
-    /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. These
-    /// members can still have a lease from before this relay's restart.
+    /// Extends `vouched_until` by the maximum duration of a lease, after a restart of this relay. Other members can
+    /// still have a lease from before the restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }
@@ -222,8 +224,9 @@ impl Lease {
         matches!(self.state, LeaseState::Pending)
     }
 
-    /// Returns the silence after which a neighbour is permitted to count as lost. It is the lease duration of the last
-    /// renewal, but at least `dead_after`.
+    /// Returns the silence after which a neighbour may count as lost.
+    ///
+    /// It is the lease duration of the last renewal, but at least `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let span = self.current.map_or(0, |current| current.span);
         from_tenths(span).max(settings.dead_after)
@@ -241,9 +244,10 @@ impl Lease {
     /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before `rest`.
     ///
     /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
-    /// that lease ends by `vouched_until`, because no renewal completes without all members. The age of an outstanding
-    /// renewal counts as a round trip only if this relay was a member of `base` and `lost` is false. If a relay is lost
-    /// (`lost` is true), the age measures an outage.
+    /// that lease ends by `vouched_until`, because no renewal completes without all members.
+    ///
+    /// The age of an outstanding renewal counts as a round trip only if this relay was a member of `base` and `lost` is
+    /// false. If a relay is lost (`lost` is true), the age measures the outage.
     pub(crate) fn accept_view(
         &mut self,
         now: Instant,
@@ -262,7 +266,7 @@ impl Lease {
         self.end();
     }
 
-    /// Ends the lease. The next lease starts after this relay has agreed on a position in a later view.
+    /// Ends the lease. The next one requires an agreement on positions in a later view.
     pub(crate) fn end(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
@@ -274,8 +278,8 @@ impl Lease {
         self.requests = None;
     }
 
-    /// Records that all members have accepted this relay's view. Leases of earlier views then end by the time from
-    /// which the view's positions may be used.
+    /// Records that all members have accepted this relay's view. Leases of earlier views then end before the view's
+    /// positions may be used.
     pub(crate) fn confirm_view(&mut self) {
         self.older_leases_end = Some(self.accepted.1);
         // The initial view is configured and needs no acceptance.
@@ -287,8 +291,8 @@ impl Lease {
         self.is_whole
     }
 
-    /// Records that this relay has agreed on its position. At the leader (`leads` is true) this means that all members
-    /// have agreed, so the first lease renewal is scheduled.
+    /// Records that this relay has agreed on its position. At the leader (`leads` is true) all members have then
+    /// agreed, so the first lease renewal is scheduled.
     pub(crate) fn on_agreement(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
@@ -299,8 +303,7 @@ impl Lease {
         }
     }
 
-    /// Handles a lease renewal, or the reply to a renewal, of this relay's view. A renewal comes from the previous
-    /// relay, a reply from the next relay.
+    /// Handles a lease renewal (from the previous relay) or a reply to a renewal (from the next relay).
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         match message {
             Message::Pulse(pulse) => self.on_pulse(context, *pulse),
@@ -328,7 +331,7 @@ impl Lease {
                 _ => return Effects::STALE,
             }
         } else if !self.is_agreed {
-            // Another node with this relay's index has agreed on the position.
+            // The agreement was made by another node with this relay's index.
             return Effects::FOREIGN;
         }
         self.orders = pulse.orders;
@@ -336,11 +339,11 @@ impl Lease {
         effects
     }
 
-    /// Extends this relay's lease after the renewal `pulse`, in which all members took part. The lease then ends when
-    /// the duration in `pulse` has passed since this relay forwarded the renewal.
+    /// Extends this relay's lease after the renewal `pulse`. The lease ends when the duration in `pulse` has passed
+    /// since this relay forwarded the renewal. All members took part in the renewal.
     ///
-    /// This relay's first lease in a view is not granted if `next`, the duration in the next renewal, is more than
-    /// twice as long as the duration in `pulse`. The lease would expire before the next renewal completes.
+    /// The first lease in a view is not granted if `next` is more than twice the duration in `pulse`. It would expire
+    /// before the next renewal, with the duration `next`, completes.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -365,16 +368,16 @@ impl Lease {
         }
     }
 
-    /// Completes the current lease renewal and schedules the reply to the previous relay. The leader instead extends
-    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this relay; `None`
-    /// at the last relay.
+    /// Completes the current lease renewal, and schedules the reply to the previous relay. The leader instead extends
+    /// its own lease and schedules the next renewal. `received` contains the requests of the relays after this relay;
+    /// `None` at the last relay.
     fn complete_renewal(&mut self, context: &Context<'_>, received: Option<Requests>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
             return;
         };
         self.requests = match self.departures.first() {
-            // The last relay of the chain starts with this.
+            // At the last relay of the chain the collection of requests begins.
             None => received.or(Some(Requests {
                 in_place: true,
                 ..Requests::NONE
@@ -395,8 +398,8 @@ impl Lease {
         if !context.leads() {
             return;
         }
-        // The period counts from the start of a renewal: after a slow one the next one is due at once, but after a pause for
-        // other traffic.
+        // The period counts from the start of a renewal. So after a slow renewal the next one is due at once, apart
+        // from a pause for other traffic.
         let period = self.period(context.settings());
         // The second renewal follows at once, because no other member has a lease before it.
         let first = self.state == LeaseState::Pending;
@@ -414,7 +417,7 @@ impl Lease {
 
     fn period(&self, settings: &Settings) -> Duration {
         let half = Duration::from_micros(settings.probe_after.as_micros() / 2);
-        // The last announced span may be the shortest one: several periods must fit into it.
+        // The last announced span may be the shortest possible one, so several periods must fit into `dead_after`.
         let most = Duration::from_micros(settings.dead_after.as_micros() / 4);
         half.max(self.round_trip.times(2).min(most)).max(PAUSE)
     }
@@ -517,8 +520,8 @@ mod tests {
     use crate::view::ViewId;
 
     /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
-    /// change the leader is in view 1, and a renewal of its lease has been unfinished for 40 s. The new view has the
-    /// number `base` + 1; it follows view `base` and loses no relay.
+    /// change the leader is in view 1, and a lease renewal has been outstanding for 40 s. The new view is number `base`
+    /// + 1. It follows view `base`, and no relay is lost.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

@@ -1,17 +1,18 @@
 //! Distribution of a newer mission in flight.
 //!
-//! Any relay next to the ground station accepts an offer. Each hello states the mission that its sender has. A relay offers its
-//! mission to a neighbour with an older one, and requests a view if its stored mission is newer than the active one. A proposal
-//! names the mission of the view, and only relays that have exactly that mission forward it. So all members of a granted view
-//! have its mission. A relay that misses the decision, or loses the mission, cannot take part in anything before it flies that
-//! mission too.
+//! Any relay next to the ground station accepts an offer. Each hello states its sender's mission. A relay offers its
+//! mission to a neighbour with an older one. It requests a view if its stored mission is newer than the active one. A
+//! proposal names the mission of the view, and only relays that have exactly that mission forward it. So all members of
+//! a granted view have its mission. A relay that misses the decision, or loses the mission, cannot take part in
+//! anything before it flies that mission too.
 //!
-//! An offer contains the number of a recent hello of its receiver. The number changes after `dead_after`; it and the previous one
-//! are valid until twice `dead_after` after their last use. So a recorded or withheld offer is worthless later, although its tag
-//! is right.
+//! An offer repeats the number of a recent hello of its receiver. The number changes after `dead_after`. The current
+//! and the previous number are valid until twice `dead_after` after their last use. So an offer that was recorded or
+//! withheld is worthless later, although its tag is right.
 //!
-//! A relay with an offer to make, but without a recent hello to answer, sends a hello that requests one. Offers are repeated
-//! until the neighbour reports the mission: first after four hop times, then less and less often, sixteen times.
+//! A relay that has an offer to make, but no recent hello of the neighbour, sends a hello that requests one. Offers are
+//! repeated up to sixteen times until the neighbour reports the mission: first after four hop times, then less and less
+//! often.
 //!
 //! | event | action |
 //! | --- | --- |
@@ -38,8 +39,7 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{Upload, UploadError, check_line};
 
-/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0 means that there is no
-/// nonce.
+/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0: no nonce.
 ///
 /// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
 #[derive(Clone, Copy, Debug)]
@@ -49,23 +49,22 @@ struct Asked {
     last: Instant,
 }
 
-/// State of this relay's mission offers on one side, to the neighbour and to the ground station.
+/// Mission offers to the neighbour on one side, and replies to the ground station there.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Nonce in the neighbour's last hello, 0 without a hello. An offer to the neighbour repeats this nonce.
+    /// Nonce in the neighbour's last hello, repeated by the next offer to it. 0 without a hello.
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` without a hello.
     heard: Option<Instant>,
     /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
-    /// Time at which the offer to the neighbour is repeated; `None` if it is not repeated.
+    /// Time at which the offer is repeated; `None` if it is not repeated.
     at: Option<Instant>,
-    /// Number of mission offers sent since the mission or the neighbour last changed.
+    /// Number of offers sent since the mission or the neighbour last changed.
     tries: u8,
     /// True if a hello to the ground station on this side is pending.
     reports: bool,
-    /// Number of the ground station's request for the uploaded mission; 0 if there is no such request. The reply
-    /// repeats the number.
+    /// Number of the ground station's request for the uploaded mission, repeated in the reply. 0 without a request.
     ground_asks: u16,
 }
 
@@ -86,10 +85,11 @@ impl Offering {
 pub(crate) enum Offered {
     /// The offered mission is newer than the stored one, and has been stored.
     Stored,
-    /// The mission is rejected: it does not fit the positions of Tx and Rx, the geofence or the settings. `is_new` is true at the
-    /// first rejection of this mission.
+    /// The mission is rejected: it does not fit the Tx and Rx positions, the geofence or the settings.
+    ///
+    /// `is_new` is true at the first rejection of this mission.
     Refused { why: LineError, is_new: bool },
-    /// The mission is ignored: it is not newer than the stored one, or is meant for other relays.
+    /// The mission is ignored: it is not newer than the stored one, or is meant for another chain.
     Passed,
 }
 
@@ -100,40 +100,36 @@ const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;
 
-/// Missions that one relay has stored, and its offers of the newest mission to its neighbours.
+/// Missions stored by this relay, and its offers of the newest mission to its neighbours.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
     /// Identifier of the newest mission that this relay has stored.
     latest: MissionId,
-    /// State of the mission uploads; the array is empty without the feature `upload`.
+    /// State of mission uploads. Empty without the feature `upload`.
     uploads: [Uploads; UPLOAD as usize],
 }
 
-/// State of mission uploads, which only builds with the feature `upload` have.
 #[derive(Clone, Copy, Debug)]
 struct Uploads {
-    /// Newest mission that was uploaded to this relay. `None` if it has only the mission loaded before flight.
+    /// Newest uploaded mission. `None` if this relay has only the mission loaded before flight.
     upload: Option<Upload>,
-    /// Positions of Tx and Rx that the active mission states; `None` if the configured positions apply. All x are
-    /// measured along the line between them.
+    /// Positions of Tx and Rx in the active mission; `None` if the configured positions apply. The x axis runs from Tx
+    /// to Rx.
     sites: Option<Sites>,
-    /// Distance from Tx to Rx of the mission loaded before flight, m.
+    /// Distance from Tx to Rx in the mission loaded before flight, m.
     loaded_m: f32,
-    /// Range of altitudes in the mission loaded before flight, m. It includes the permitted range and the common
-    /// altitude.
+    /// Range of altitudes in the mission loaded before flight, m. It includes the common altitude.
     loaded_band: Band,
-    /// Identifier of the last mission that a relay has refused; `None` if there is none. This relay, a neighbour or a
-    /// relay farther away has refused it.
+    /// Last mission that this relay or another relay has refused; `None` if there is none.
     refused: Option<MissionId>,
-    /// Current nonce (random number) in this relay's hellos, and the previous one. A mission offer must repeat one of
-    /// them.
+    /// Current and previous nonce (random number) in this relay's hellos. A mission offer must repeat one of them.
     asked: [Asked; 2],
-    /// State of the mission offers to the two neighbours: toward Tx, and toward Rx.
+    /// Mission offers to the neighbour toward Tx and to the neighbour toward Rx.
     offering: [Offering; 2],
     jitter: Jitter,
 }
 
-/// Returns true if this relay accepts uploaded missions. It accepts them if its frames are signed.
+/// Returns true if this relay accepts uploaded missions, which requires signed frames.
 pub(crate) const fn accepts_uploads(member: &Member) -> bool {
     UPLOAD && member.settings.auth.is_some()
 }
@@ -179,7 +175,7 @@ impl MissionUpdate {
         Mission::try_new(*upload.config()).ok()
     }
 
-    /// Returns the nonce for the next hello, which an offer must repeat; 0 if uploads are not accepted. The nonce
+    /// Returns the nonce for the next hello, which an offer must repeat. 0 if uploads are not accepted. The nonce
     /// changes every `dead_after`.
     pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
@@ -199,8 +195,9 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay. "Recent" means within the
-    /// last two periods of `dead_after`.
+    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay.
+    ///
+    /// Recent means within the last two periods of `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -223,7 +220,6 @@ impl MissionUpdate {
         }
     }
 
-    /// Schedules an offer of the newest mission to the neighbour at `side`.
     pub(crate) fn schedule_offer(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.is_due = true;
@@ -246,8 +242,8 @@ impl MissionUpdate {
     /// Returns the pending mission offer to the neighbour `to` at `side`, and marks it as sent.
     ///
     /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The returned number is the
-    /// nonce of the neighbour's hello, which the offer repeats. The number is `None` if the hello is older than half
-    /// of `dead_after`. A new hello must then be requested first.
+    /// nonce of the neighbour's hello, which the offer repeats. It is `None` if the hello is older than half of
+    /// `dead_after`: the caller must then request a new hello first.
     pub(crate) fn poll_offer(
         &mut self,
         (side, to): (Side, u16),
@@ -270,7 +266,7 @@ impl MissionUpdate {
         Some((upload, answers.then_some(offering.nonce)))
     }
 
-    /// Schedules a repetition of the offer to the neighbour on each side if its timer has expired.
+    /// Schedules the next repetition of the offers whose timers have expired.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             if let Some(offering) = self.offering(side)
@@ -287,8 +283,9 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules replies to the ground station at `side`. If `reports` is true, the reply is a hello. If `asks` is the
-    /// number of a request (not `None`), the stored upload is sent.
+    /// Schedules replies to the ground station at `side`.
+    ///
+    /// A hello is scheduled if `reports` is true, and the stored upload if `asks` is the number of a request.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -302,27 +299,27 @@ impl MissionUpdate {
         offering.is_some_and(|offering| core::mem::take(&mut offering.reports))
     }
 
-    /// Returns the upload that the ground station at `side` has requested, with the number of its request. `None` if
+    /// Returns the upload that the ground station at `side` has requested, and the number of the request. `None` if
     /// nothing is requested, or there is no upload.
     pub(crate) fn poll_requested(&mut self, side: Side) -> Option<(Upload, u16)> {
         let answer = core::mem::take(&mut self.offering(side)?.ground_asks);
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
-    /// Returns the last refused mission. `None` if there is none, if it is the mission `active`, or if the stored
+    /// Returns the last refused mission. `None` without a refusal, if it is the mission `active`, or if the stored
     /// mission is newer.
     pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
-    /// Records a neighbour's report that the mission `refused` is refused. Returns true if this is the stored
-    /// mission, and its refusal was not known yet.
+    /// Records a neighbour's report that the mission `refused` is refused. Returns true if it is the stored mission and
+    /// the refusal is new.
     pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
 
-    /// Records that mission `id` is refused. Returns true if this was not known before.
+    /// Records that mission `id` is refused. Returns true if this is new.
     fn refuse(&mut self, id: MissionId) -> bool {
         let uploads = self.uploads.first_mut();
         uploads.is_some_and(|uploads| uploads.refused.replace(id) != Some(id))
@@ -370,8 +367,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Restores the stored mission `upload` after a start, and returns it. Returns an error if `untouched` is false,
-    /// because the relay has then already taken part in the chain.
+    /// Restores the stored mission `upload` after a start, and returns it. Returns an error if `untouched` is false:
+    /// the relay has then already taken part in the chain.
     pub(crate) fn resume(
         &mut self,
         member: &Member,
@@ -387,7 +384,7 @@ impl MissionUpdate {
         Ok(mission)
     }
 
-    /// Returns the stored mission if it was uploaded. `None` if only the mission loaded before flight is known.
+    /// Returns the uploaded mission; `None` if only the mission loaded before flight is known.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
         match self.uploads() {
             Some(uploads) => uploads.upload.as_ref(),
@@ -395,8 +392,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Returns the upload to offer to a neighbour whose newest mission is `holds` (`None` if unknown). The result is
-    /// `None` if the neighbour's mission is not older than the upload, or if there is no upload.
+    /// Returns the upload to offer to a neighbour whose newest mission is `holds` (`None` if unknown). `None` if the
+    /// neighbour's mission is not older than the upload, or if there is no upload.
     pub(crate) fn offer_for(&self, holds: Option<MissionId>) -> Option<Upload> {
         let older = holds.is_none_or(|holds| holds < self.latest);
         self.upload().copied().filter(|_| older)
@@ -404,8 +401,8 @@ impl MissionUpdate {
 
     /// Checks that `upload` fits the loaded mission, the settings, the sites and the geofence.
     ///
-    /// The sites are the positions of Tx and Rx. A relay whose interference is a field (a known distribution along x)
-    /// accepts no upload at all.
+    /// The sites are the positions of Tx and Rx. A relay accepts no upload if its interference is configured as a
+    /// function of x (a field).
     fn fits(&self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         let config = upload.config();
         let loaded = self.uploads().ok_or(UploadError::Base)?;
@@ -423,7 +420,7 @@ impl MissionUpdate {
             .encloses(member, config, upload.sites().is_some())
             .map_err(UploadError::Line)?;
         match upload.sites() {
-            // Relays without a line on earth check it too, so that either all relays store the mission or none.
+            // Relays without Tx and Rx coordinates check this too, so that all relays store the mission or none does.
             Some(sites) => check_line(sites, config.distance_m).map_err(UploadError::Line),
             None if member.settings.sited && is_other => {
                 Err(UploadError::Line(LineError::Distance))
@@ -433,10 +430,9 @@ impl MissionUpdate {
     }
 }
 
-/// Methods for the Tx and Rx positions of the active mission, which define its x axis.
+/// Positions of Tx and Rx in the active mission, which define its x axis.
 impl MissionUpdate {
-    /// Returns the positions of Tx and Rx if the active mission states them. `None` if the configured positions
-    /// apply.
+    /// Returns the Tx and Rx positions of the active mission; `None` if the configured positions apply.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.uploads()?.sites
     }
@@ -446,16 +442,18 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Replaces the Tx and Rx positions in use by the positions of the stored mission. This mission becomes active.
-    /// Returns true if the positions have changed, which makes all relay positions invalid.
+    /// Makes the stored mission's Tx and Rx positions the ones in use. Returns true if they have changed, which makes
+    /// all relay positions invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
         uploads.is_some_and(|uploads| core::mem::replace(&mut uploads.sites, sites) != sites)
     }
 
-    /// Returns the configured geofence for the active mission; `None` without a guard. An active mission with its own Tx and Rx positions
-    /// can have another distance Tx-Rx than the loaded mission. The geofence's maximum x is changed by the difference.
+    /// Returns the geofence for the active mission; `None` without a guard.
+    ///
+    /// If the mission's distance from Tx to Rx differs from that of the loaded mission, the maximum x changes by the
+    /// difference.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {
@@ -467,11 +465,11 @@ impl MissionUpdate {
 }
 
 impl Uploads {
-    /// Checks that a mission with `config` is within the configured geofence. The error names the limit exceeded.
+    /// Checks that a mission with `config` is within the configured geofence. The error names the exceeded limit.
     ///
-    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. If the fixed altitude of a
-    /// relay is the lower or upper limit of its geofence, the limit of the loaded mission counts instead. Reason: all
-    /// relays must decide alike.
+    /// The length of a mission with its own Tx and Rx positions (`sited`) is not limited. If the fixed altitude of a
+    /// relay is a limit of its geofence, the altitude limit of the loaded mission counts instead. All relays must
+    /// decide alike.
     fn encloses(
         &self,
         member: &Member,
@@ -510,7 +508,7 @@ impl Uploads {
     }
 }
 
-/// Returns the range of altitudes of a mission, m, extended to include the relays' common altitude.
+/// Returns the range of altitudes of a mission, m, extended to the relays' common altitude.
 fn altitudes_of(config: &MissionConfig) -> Band {
     let common_m = config.common.altitude_m;
     Band {

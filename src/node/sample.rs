@@ -1,9 +1,8 @@
-//! Measurements of a relay: the interference at its setpoint, and its state in the estimation.
+//! Measurements of a relay: the interference at its setpoint, and the search for an unknown interferer.
 //!
-//! The estimation is that of an unknown interferer.
-//!
-//! The interference at the setpoint is estimated as often as the relay moves. That estimate is replaced once the number of samples of `Settings::measure` has been taken at a position. Before that the
-//! estimate of the last position is used, so a relay reports the same value during one agreement.
+//! The interference at the setpoint is estimated anew at each position, from the number of samples in
+//! `Settings::measure`. Until these samples are taken, the estimate of the last position is used. So a relay reports
+//! the same value during one agreement.
 
 use crate::features::{FIELD, SENSING};
 use crate::field::estimate::{Estimate, Estimator};
@@ -23,12 +22,13 @@ use crate::sir::square;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
-/// Measurement of a relay or of a ground station, which the firmware gives to the relay.
+/// Measurement of a relay or of a ground station.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
-    /// Interference power at a relay's setpoint, for a mission with an interference field. A field is a known
-    /// distribution of the interference along x.
+    /// Interference power at a relay's setpoint, for a mission with an interference field.
+    ///
+    /// In such a mission the interference is known only as a function of x.
     Interference {
         /// Received interference power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
@@ -36,30 +36,28 @@ pub enum Sample {
     /// Mean interference power at a position, for the estimate of an unknown interferer.
     ///
     /// The firmware averages the power until the relative error of the mean is the error stated in
-    /// [`Listen`](crate::sensing::Listen). The power excludes the signals of the chain, and includes the receiver's
-    /// noise; the relay subtracts this noise (`MissionConfig::noise_w`).
+    /// [`Listen`](crate::sensing::Listen). The power excludes the chain's signals, and includes the receiver's noise.
+    /// The relay subtracts this noise (`MissionConfig::noise_w`).
     Heard {
-        /// Position of the drone at the measurement. Each coordinate differs from the coordinate of Tx by at most 100
-        /// times the distance from Tx to Rx.
+        /// Position of the drone at the measurement. Each coordinate differs from that of Tx by at most 100 times the
+        /// distance from Tx to Rx.
         at: Placement,
         /// Received power, W. It must exceed the receiver's noise by 1e-30 to 1e6 W (`MEASURED_W`).
         power_w: f32,
     },
-    /// Mean interference power measured at Tx, on the ground. The firmware gives the value to one of the first four
-    /// relays, usually relay 1.
+    /// Mean interference power measured at Tx, on the ground. The firmware passes it to one of the first four relays,
+    /// usually relay 1.
     Transmitter {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Mean interference power measured at Rx, on the ground. The firmware gives the value to the last relay of the
-    /// view. The firmware can also give the value to the three relays before the last relay. Such a relay uses the
-    /// value once it is the last relay itself.
+    /// Mean interference power measured at Rx, on the ground. The firmware passes it to the last relay of the view. It
+    /// can also pass it to the three relays before the last relay. They use the value once they are the last relay.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from this
-    /// SIR.
+    /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from it.
     FirstHop {
         /// Signal-to-interference ratio (SIR), linear, above 0.
         sir: f32,
@@ -67,8 +65,7 @@ pub enum Sample {
 }
 
 impl Sample {
-    /// Returns true for measurements from which an unknown interferer is estimated. Such measurements need
-    /// `Settings::listen`.
+    /// Returns true for measurements of an unknown interferer, which need `Settings::listen`.
     pub(crate) const fn is_heard(self) -> bool {
         matches!(
             self,
@@ -77,7 +74,7 @@ impl Sample {
     }
 }
 
-/// Average of the interference samples that the firmware has measured at the setpoint.
+/// Average of the interference samples measured at the setpoint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {
     estimator: Option<(Estimator, u32)>,
@@ -97,8 +94,8 @@ impl Meter {
         }
     }
 
-    /// Adds a sample; returns true if it was accepted. `at` is relay 1's setpoint, needed to convert a measured SIR
-    /// of the first hop to interference; `None` at other relays.
+    /// Adds a sample. Returns true if it was accepted. `at` is relay 1's setpoint, needed to convert the SIR of the
+    /// first hop to interference; `None` at other relays.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,
@@ -121,13 +118,14 @@ impl Meter {
         let used = estimator.accepted() > before;
         if used && estimator.accepted() == *wanted {
             let upsilon = estimator.estimate().map(|estimate| estimate.upsilon_per_w);
-            // Without a valid estimate the agreed field is better than the estimate of another position.
+            // Without a valid estimate the agreed interference is used, because the last estimate is for another
+            // position.
             self.published = upsilon.filter(|upsilon| is_upsilon(*upsilon));
         }
         used
     }
 
-    /// Discards the samples averaged so far, because the relay moves.
+    /// Discards the samples averaged so far, because the setpoint moves.
     pub(crate) fn restart(&mut self) {
         if let Some((estimator, _)) = &mut self.estimator {
             estimator.clear();
@@ -146,56 +144,53 @@ impl Meter {
 /// Maximum distance of a measurement from Tx in each coordinate, in units of the distance Tx to Rx.
 const FARTHEST: f32 = 100.0;
 
-/// Sensing state of a relay; the array is empty without the feature `sensing`.
+/// Sensing state of a relay. Empty without the feature `sensing`.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing([SensorState; SENSING as usize]);
 
-/// Measurements of a relay, its interference estimate, and its knowledge of faulty sensors.
+/// A relay's measurements, its interference estimate, and its list of faulty sensors.
 #[expect(clippy::struct_excessive_bools, reason = "each for itself")]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SensorState {
     pub(super) listener: Listener,
     pub(super) estimate: NumberedEstimate,
-    /// Average of the interference power that Tx, on the ground, has reported to this relay.
+    /// Average of the interference power measured at Tx on the ground.
     pub(super) transmitter: Average,
-    /// Average of the interference power that Rx, on the ground, has reported to this relay.
+    /// Average of the interference power measured at Rx on the ground.
     pub(super) receiver: Average,
-    /// True while this relay withholds its measurements. They contradict the measurements of the other nodes.
+    /// True while this relay withholds its measurements because they contradict those of the other nodes.
     pub(super) off: bool,
-    /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
-    /// measurements.
+    /// Node whose measurements were left out of the last collection of measurements; 0 for none.
     pub(super) left_out: u16,
-    /// Node whose sensor was found faulty, by the leader or by the node itself; 0 for none.
+    /// Node whose sensor counts as faulty, as found by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
-    /// State of the leader's search for a faulty sensor. The search leaves out the measurements of one relay after
-    /// the other.
+    /// State of the leader's search for a faulty sensor. It leaves out one relay's measurements after the other's.
     pub(super) trial: Trial,
-    /// Ground stations (Tx, Rx) whose measurements contradict the measurements of the relays. Known at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
     pub(super) ends: EndsOff,
-    /// True if the last collected measurements contradict each other, but the faulty sensor was not found.
+    /// True if the last collected measurements contradict each other and no faulty sensor was found.
     pub(super) contradicted: bool,
-    /// True if this relay measures nothing where the other relays' measurements predict interference.
+    /// True if this relay measures no interference where the other relays' measurements predict some.
     pub(super) deaf: bool,
-    /// Number of consecutive measurements of this relay that were at or below the receiver's noise.
+    /// Number of this relay's last consecutive measurements at or below the receiver's noise.
     pub(super) silent: u8,
     /// Position of the last measurement at or below the receiver's noise.
     pub(super) silent_at: Placement,
-    /// True once the relays of the view have received the current estimate; at the leader only.
+    /// True once the view's relays have received the current estimate. Known at the leader only.
     pub(super) is_distributed: bool,
-    /// Amount and expected error of the measurements from which the current estimate was made.
+    /// Number and expected error of the measurements behind the current estimate.
     pub(super) known: Knowledge,
     /// Reason why the last collected measurements gave no estimate; `None` if they gave an estimate.
     pub(super) unfit: Option<Unfit>,
     /// Interval between two collections of measurements along the chain, as a multiple of `Listen::every`.
     pub(super) wait: u32,
-    /// Number of consecutive sensing passes that did not change the estimate, modulo [`PATIENCE`]. A sensing pass
-    /// collects measurements.
+    /// Number of consecutive collections of measurements without a new estimate, modulo [`PATIENCE`].
     pub(super) kept: u8,
-    /// Time of the next sensing pass, which collects measurements; `None` if none is scheduled.
+    /// Time of the next collection of measurements along the chain; `None` if none is scheduled.
     pub(super) at: Option<Instant>,
 }
 
-/// Estimate before any measurement: the interference that the mission configures.
+/// Estimate before any measurement: the interference configured in the mission.
 const AS_LOADED: NumberedEstimate = NumberedEstimate {
     number: 0,
     estimate: InterferenceEstimate::Mission,
@@ -241,7 +236,7 @@ impl Sensing {
         sensors.first_mut()
     }
 
-    /// Resets the sensing for a new view, in which the leader first distributes its estimate to all relays.
+    /// Resets the sensing for a new view. The leader then distributes its estimate to all relays first.
     pub(super) const fn renew(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
             sensor.is_distributed = false;
@@ -250,12 +245,12 @@ impl Sensing {
         }
     }
 
-    /// Handles a new mission: the interference that it configures becomes the estimate.
+    /// Resets the sensing for a new mission. Its configured interference becomes the estimate.
     pub(super) const fn load(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
             sensor.estimate.estimate = InterferenceEstimate::Mission;
             sensor.estimate.number = sensor.estimate.number.wrapping_add(1);
-            // Its ground ends may be at other places.
+            // The ground stations of the new mission may be at other places.
             sensor.transmitter = Average::NONE;
             sensor.receiver = Average::NONE;
             sensor.known = Knowledge::NOTHING;
@@ -268,7 +263,7 @@ impl Sensing {
         self.sensor()?.at
     }
 
-    /// Returns true if the next sensing pass, which collects measurements, is due. Stops its timer.
+    /// Returns true if the next collection of measurements is due, and stops its timer.
     pub(super) fn poll_due(&mut self, now: Instant) -> bool {
         self.sensor_mut()
             .is_some_and(|sensor| sensor.at.take_if(|at| *at <= now).is_some())
@@ -281,8 +276,8 @@ impl Sensing {
         }
     }
 
-    /// Returns the reason why the last measurements gave no estimate. `None` if they gave an estimate, and always
-    /// `None` at other relays than the leader.
+    /// Returns the reason why the last measurements gave no estimate. `None` if they gave one, and at all relays but
+    /// the leader.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
         match self.sensor() {
             Some(sensor) => sensor.unfit,
@@ -290,8 +285,7 @@ impl Sensing {
         }
     }
 
-    /// Returns the mean interference power that the ground station at `side` has reported, W. `None` without a
-    /// report.
+    /// Returns the mean interference power reported by the ground station at `side`, W. `None` without a report.
     pub(crate) fn level_w(&self, side: Side) -> Option<f32> {
         let sensor = self.sensor()?;
         let level_w = match side {
@@ -319,7 +313,7 @@ impl Sensing {
 
 impl SensorState {
     /// Returns the interference level at a ground station at `now`, from the `average` of its reports. Older reports
-    /// have less weight in an estimate.
+    /// have less weight.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {
@@ -330,7 +324,7 @@ impl SensorState {
 
     fn add_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         let noise_w = member.mission.config().noise_w;
-        // Subtracts the receiver's noise; `None` if the rest is out of range.
+        // Subtracts the receiver's noise. `None` if the difference is out of range.
         let heard = |power_w: f32| {
             let heard_w = power_w - noise_w;
             is_level(heard_w).then_some(heard_w)
@@ -363,31 +357,31 @@ impl SensorState {
     }
 }
 
-/// State of one relay in a sensing pass, a message along the chain that collects measurements.
+/// State of one relay in a sensing pass, which collects measurements along the chain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums of measurements over all earlier relays of the pass, as received from the previous relay.
+    /// Sums of the measurements of all earlier relays, as received from the previous relay.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the positions were agreed on with the current estimate. No new agreement is needed then.
+    /// True if the positions were agreed on with the current estimate, so that no new agreement is needed.
     pub(super) holds: bool,
 }
 
-/// Sensing results whose changes are reported to the firmware.
+/// Sensing results that are reported to the firmware when they change.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Findings {
     pub(super) estimate: NumberedEstimate,
     pub(super) unfit: Option<Unfit>,
-    /// Node with a faulty sensor, according to the last sensing pass; 0 for none.
+    /// Node with a faulty sensor, according to the last collected measurements; 0 for none.
     pub(super) off: u16,
     pub(super) ends: EndsOff,
     pub(super) deaf: bool,
 }
 
 impl Findings {
-    /// Returns the changes from the findings `before` to these findings. A faulty ground station is node 0 (Tx) or
-    /// node `all` + 1 (Rx), where `all` is the number of relays.
+    /// Returns the changes from the earlier findings `before`. A faulty ground station counts as node 0 (Tx) or node
+    /// `all` + 1 (Rx), where `all` is the number of relays.
     #[inline(never)] // called from several places
     pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
         let off = if self.off != before.off && self.off != 0 {
@@ -407,10 +401,9 @@ impl Findings {
     }
 }
 
-/// Adds the power that a ground station (Tx or Rx) has measured to that station's `average`. Returns false if the
-/// power is not above the noise.
+/// Adds a ground station's measured power to its `average`. Returns false if the power is not above the noise.
 ///
-/// `heard_w` is the measured power minus the receiver noise, W; `None` if the power is not above the noise.
+/// `heard_w` is the measured power minus the receiver noise, W; `None` if it is not above the noise.
 fn take_level(
     average: &mut Average,
     now: Instant,
@@ -423,8 +416,8 @@ fn take_level(
     heard_w.is_some()
 }
 
-/// Returns true if a measurement at `at` is near enough to Tx to be used. Each coordinate is at most [`FARTHEST`]
-/// times `distance_m`, the distance from Tx to Rx.
+/// Returns true if a measurement at `at` is near enough to Tx to be used. Each coordinate may differ by at most
+/// [`FARTHEST`] times `distance_m`, the distance from Tx to Rx.
 fn is_near(at: Placement, distance_m: f32) -> bool {
     let far_m = FARTHEST * distance_m;
     [at.x_m, at.y_m, at.altitude_m]

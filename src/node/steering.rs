@@ -1,4 +1,6 @@
-//! Setpoint on the way to the agreed position. Limited by the [guard](crate::guard), or without a guard the agreed position.
+//! Setpoint on the way to the position that the chain has agreed on.
+//!
+//! It is limited by the [guard](crate::guard), if there is one.
 
 use super::context::{earliest, tenths};
 use crate::features::{DEPARTURES, GUARD};
@@ -9,18 +11,19 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Time after which the relay repeats its fence messages to the neighbours: a message can be lost. A fence is the plane across x that keeps
-/// two neighbours apart.
+/// Time after which fence messages to the neighbours are repeated, because a message can be lost.
+///
+/// A fence is the plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
-/// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
+/// Moves a relay's setpoint to the position that the chain has agreed on, as far as the guard permits.
 #[derive(Clone, Debug)]
 pub(crate) struct Steering {
     guard: Option<Guard>,
     remind_at: Option<Instant>,
-    /// Setpoint last reported to the firmware; `None` if the relay had no setpoint then.
+    /// Setpoint last reported to the firmware; `None` if there was none.
     reported_setpoint: Option<Placement>,
-    /// Stepwise motion to a new agreed position; the array is empty without the feature `departures`.
+    /// Stepwise motion to a new agreed position. Empty without the feature `departures`.
     way: [Way; DEPARTURES as usize],
 }
 
@@ -36,14 +39,16 @@ struct Motion {
     at: Instant,
 }
 
-/// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that they arrive together.
+/// Stepwise motion of the setpoint to a new agreed position.
+///
+/// It takes the same time at all relays of a chain, so that they arrive together.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position at the last call of `advance`. The next field, `wanted`, is the position to fly to now: it approaches the agreed
-    /// position in steps.
+    /// Agreed position at the last call of `advance`. `wanted` is the position to fly to now, and approaches it in
+    /// steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
-    /// Motion to the agreed position; `None` once the position to fly to has reached the agreed position.
+    /// Motion to the agreed position; `None` once it has ended.
     motion: Option<Motion>,
 }
 
@@ -54,7 +59,7 @@ impl Way {
         motion: None,
     };
 
-    /// Returns the position to fly to at `now`; `None` without an agreed position. If the agreed position `agreed` has changed, the
+    /// Returns the position to fly to at `now`; `None` without an agreed position. If `agreed` has changed, the
     /// position to fly to moves there in 32 steps within the time `span`.
     fn advance(
         &mut self,
@@ -67,7 +72,7 @@ impl Way {
             return self.wanted;
         }
         self.agreed = agreed;
-        // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
+        // A changed motion ends at the time planned for the old one, so that frequent agreements do not delay the end.
         let left = self.motion.map(|it| (it.since + it.span).since(now));
         let span = left.map_or(span, |left| left.min(span));
         self.motion = self
@@ -86,7 +91,7 @@ impl Way {
         self.wanted
     }
 
-    /// Moves the position to fly to. It makes all steps of the current motion that are due at `now`.
+    /// Makes all steps of the current motion that are due at `now`.
     fn step(&mut self, now: Instant) {
         let (Some(motion), Some(to)) = (&mut self.motion, self.agreed) else {
             return;
@@ -129,7 +134,7 @@ impl Steering {
         way: [Way::NONE; DEPARTURES as usize],
     };
 
-    /// Creates the guard, if `settings` request a guard. `neighbours` are the node numbers on the two sides.
+    /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,
@@ -146,8 +151,8 @@ impl Steering {
         self.guard.as_mut().filter(|_| GUARD)
     }
 
-    /// Moves the setpoint toward the position `agreed` as far as the guard allows at `now`. Returns true if the
-    /// setpoint has changed. A motion to a new position takes `span`.
+    /// Moves the setpoint toward the agreed position as far as the guard permits at `now`. Returns true if the setpoint
+    /// has changed. A motion to a new position takes `span`.
     pub(crate) fn steer(
         &mut self,
         now: Instant,
@@ -201,8 +206,7 @@ impl Steering {
         }
     }
 
-    /// Handles a fence message of the neighbour `from` at `side`. A fence is the plane across x that keeps two
-    /// neighbours apart.
+    /// Handles a fence message of the neighbour `from` at `side`.
     pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) {
         if let Some(guard) = self.guard() {
             guard.handle_fence(side, from, fence);
@@ -220,8 +224,7 @@ impl Steering {
         }
     }
 
-    /// Records at `now` that the drone follows the setpoints (`flown` is true) or does not (false). Returns true if this changes the state
-    /// of the guard.
+    /// Records at `now` if the drone follows the setpoints (`flown`). Returns true if this changes the guard's state.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -252,9 +255,10 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air. `others` is true if
-    /// some relays of the view at this side are not lost. Until the guard has received a message of one of these relays, it does not move
-    /// the setpoint toward this side.
+    /// Removes the limits that lost relays at `side` put on the setpoint.
+    ///
+    /// These relays are no longer in the air. `others` is true if the view has further relays at this side. Until the
+    /// guard has received a message of one of them, it does not move the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
@@ -265,12 +269,12 @@ impl Steering {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 
-    /// Returns the agreed position of the neighbour at `side`. `None` while it is unknown, and without a guard.
+    /// Returns the neighbour's agreed position at `side`. `None` while it is unknown, and without a guard.
     pub(crate) fn neighbour_place(&self, side: Side) -> Option<Placement> {
         self.guard.as_ref().filter(|_| GUARD)?.neighbour_place(side)
     }
 
-    /// Returns the next fence message, with its side and its destination node; `None` if none is pending.
+    /// Returns the next fence message, with its side and destination node; `None` if none is pending.
     pub(crate) fn poll_transmit(&mut self) -> Option<(Side, u16, Fence)> {
         self.guard()?.poll()
     }
@@ -303,7 +307,7 @@ mod tests {
         let mut reached_m = 0.0;
         let mut agreed = None;
         for step in 0..20 {
-            // Every second another agreement, a little farther.
+            // A new agreed position every second, each a little farther away.
             agreed = place(100.0 + step as f32 / 10.0);
             steering.steer(at_ms(1_000 * step), agreed, span);
             let x_m = steering.setpoint(agreed).unwrap().x_m;

@@ -1,4 +1,4 @@
-//! Facade of a relay: bytes and time in, frames and events out. It also has the records that a firmware keeps across a reboot.
+//! Facade of a relay: bytes and time in, frames and events out. Also the records kept across a reboot.
 
 use super::{Port, Transmit};
 use crate::event::Event;
@@ -29,7 +29,7 @@ use crate::wire::frame::MAX_FRAME;
 
 use crate::wire::upload::{Upload, UploadError};
 
-/// A relay of the chain: the whole protocol, without input or output of its own (sans-IO).
+/// Relay of the chain: the whole protocol, without input or output (sans-IO).
 ///
 /// # Contract
 /// - *Inputs*: [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) accept anything, never fail
@@ -37,7 +37,8 @@ use crate::wire::upload::{Upload, UploadError};
 /// - *Time* is an argument; the relay never reads a clock. Use a monotonic clock. After a backward step, timers and the
 ///   lease continue as if no time had passed between the two calls; after a forward step they expire. While a part of
 ///   the chain is out of reach, the other relays wait until the leases of that part have expired. A forward step ends
-///   this wait early: until the leases have expired, two chains can then fly.
+///   this wait early. Until the leases have expired, two parts of the chain can then fly to positions of different
+///   agreements.
 /// - *Getters* take constant time and return values of the last agreement. Positions are in metres in the frame of
 ///   [`MissionConfig`](crate::MissionConfig).
 /// - *Outputs* are built from the state on request, so no queue can overflow. After every input, store the record that
@@ -45,11 +46,11 @@ use crate::wire::upload::{Upload, UploadError};
 ///   then [`poll_event`](Self::poll_event) until it returns `None`, then sleep until
 ///   [`poll_timeout`](Self::poll_timeout) or the next byte.
 /// - After that, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
-/// - *Setpoints* are finite, within [0, D] along the line, at the relay's altitude or at an altitude in the mission's
-///   band, and at least the mission's separation from the neighbours' setpoints of the same pass. There is no setpoint
-///   before the first agreement. Only a new agreement or the relay's own move in Algorithm 2 changes the setpoint.
-///   After a new mission the setpoint stays until the chain has agreed in that mission, even outside of the new limits;
-///   if Tx or Rx have moved, there is no setpoint until then.
+/// - *Setpoints* are finite. Their x is from 0 to the distance Tx-Rx, their altitude is the relay's altitude or in the
+///   mission's band. They are at least the mission's separation from the neighbours' setpoints of the same agreement.
+///   There is no setpoint before the first agreement. Only a new agreement or the relay's move in Algorithm 2 changes
+///   the setpoint. After a new mission the setpoint stays until the chain has agreed in that mission, even outside of
+///   the new limits. If Tx or Rx have moved, there is no setpoint until then.
 ///
 /// ```
 /// use uav_relay::{Band, Channel, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
@@ -86,24 +87,24 @@ use crate::wire::upload::{Upload, UploadError};
 pub struct Relay {
     pub(super) node: Node,
     pub(super) endpoint: Endpoint,
-    /// Deframers, one for each port. The first is for the upstream port or the shared channel, the second for the
+    /// Decoders of received frames. The first is for the upstream port or the shared channel, the second for the
     /// downstream port.
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
-    /// Endurance of the drone. The array is empty without the feature `departures`.
+    /// Endurance of the drone. Empty without the feature `departures`.
     pub(super) endurance: [Endurance; DEPARTURES as usize],
 }
 
 impl Relay {
     /// Creates a relay that starts at `now`.
     ///
-    /// The leader starts the first search for positions by itself. The leader is relay 1, or relay N in a mission
-    /// with an interference field.
+    /// The leader starts the first search for positions without any input. It is relay 1, or relay N in a mission with
+    /// an interference field.
     ///
-    /// `seed` must differ between boards, even if their image and configuration are the same, and should differ
-    /// between starts: use a chip's unique number, a random number generator, or the noise of RAM after power-up. It
-    /// lets two relays with the same index distinguish each other, so that at most one has a setpoint. It also
-    /// affects retransmission timing, sweep numbers and the frames that a guard considers old, but no position.
+    /// `seed` must differ between boards, even if their image and configuration are the same, and should differ between
+    /// starts. Use a chip's unique number, a random number generator, or the noise of RAM after power-up. By the seed
+    /// two relays with the same index distinguish each other, so that at most one has a setpoint. The seed also affects
+    /// retransmission timing, message numbers and the messages that a guard considers old, but no position.
     ///
     /// # Errors
     /// Returns a [`SetupError`] that names the invalid part of `identity` or `settings`.
@@ -172,8 +173,8 @@ impl Relay {
     /// `Settings::wiring` are dropped.
     ///
     /// Takes a dozen instructions per byte, and a CRC for at most one frame per 16 bytes. For at most one message per
-    /// 19 bytes it computes positions for 16 target SIRs, and checks a tag if frames are signed. Longer work is left
-    /// to [`handle_timeout`](Self::handle_timeout).
+    /// 19 bytes it computes positions for 16 target SIRs, and checks a tag if frames are signed. Longer computations
+    /// are left to [`handle_timeout`](Self::handle_timeout).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -210,9 +211,9 @@ impl Relay {
 
     /// Handles timers that have expired by `now`, and does one step of a long computation.
     ///
-    /// The step is bounded. The leader's prediction computes at most 12 hops, each for 16 target SIRs; the joint method
-    /// the hops of at most 40 relays; Algorithm 2 tries at most 624 positions of this relay. Without a computation the
-    /// call takes almost no time.
+    /// The step is bounded. The leader's prediction computes at most 12 hops, each for 16 target SIRs. The joint method
+    /// computes the hops of at most 40 relays. Algorithm 2 tries at most 624 positions of this relay. Without a
+    /// computation the call takes almost no time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -233,8 +234,8 @@ impl Relay {
         self.review_endurance(now, false);
     }
 
-    /// Restarts the placement method from its beginning. Better positions can result once the relays have measured the
-    /// interference at the present positions.
+    /// Restarts the placement method from its beginning. Better positions can result if the relays have measured the
+    /// interference at their present positions.
     ///
     /// Only the leader restarts; at other relays the call has no effect. The leader is relay 1, or relay N in a
     /// mission with an interference field.
@@ -254,8 +255,8 @@ impl Relay {
 
     /// Writes the next frame to send into `frame`, and returns its port and length. Call it until it returns `None`.
     ///
-    /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted). Once it is stored, the pending frames
-    /// follow.
+    /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted). The pending frames follow once it is
+    /// stored.
     ///
     /// The work is linear in the frame's length. A signed frame also needs the computation of a tag.
     ///
@@ -314,8 +315,8 @@ impl Relay {
         self.node.poll_event()
     }
 
-    /// Returns the latest time for the next call of [`Relay::handle_timeout`]; `None` if no timer runs. Right after a
-    /// call of `handle_timeout` the result is later than that call's `now`, or `None`.
+    /// Returns the time by which [`Relay::handle_timeout`] must be called; `None` if no timer runs. Right after a call
+    /// of `handle_timeout` the result is later than that call's `now`, or `None`.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -333,7 +334,7 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the votes on views (acceptor state) if they have changed and must be stored; else `None`.
+    /// Returns the votes on views if they have changed and must be stored; otherwise `None`.
     ///
     /// [`poll_transmit`](Self::poll_transmit) returns no frame until the firmware has confirmed by
     /// [`persisted`](Self::persisted) that they are stored. A relay that forgot its votes in a restart could vote
@@ -355,7 +356,7 @@ impl Relay {
         self.node.unpersisted()
     }
 
-    /// Returns the current votes on views (acceptor state), whether they are stored or not.
+    /// Returns the current votes on views, stored or not.
     ///
     /// A firmware can store them at the start, so that a fault of the storage shows before flight. Takes constant time.
     pub const fn view_record(&self) -> ViewRecord {
@@ -364,14 +365,13 @@ impl Relay {
 
     /// Confirms that `record`, returned by [`unpersisted`](Self::unpersisted), is stored. Takes constant time.
     ///
-    /// A firmware without storage confirms each record at once; after a reboot its relay must then stay off for the
+    /// A firmware without storage confirms each record at once. After a reboot its relay must then stay off for the
     /// rest of the flight. If the votes have changed meanwhile, `unpersisted` returns the newer record.
     pub const fn persisted(&mut self, record: &ViewRecord) {
         self.node.persisted(record);
     }
 
-    /// Passes the votes on views to `store` if they are not stored yet. Confirms them as stored if `store` returns
-    /// true.
+    /// Passes the votes on views to `store` if they are not stored yet. If `store` returns true, they count as stored.
     ///
     /// See [`unpersisted`](Self::unpersisted).
     pub fn persist(&mut self, mut store: impl FnMut(&ViewRecord) -> bool) {
@@ -387,7 +387,7 @@ impl Relay {
     /// Call it right after the relay was created; only `Relay::resume` is allowed before. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and
+    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission. Returns
     /// [`RecordError::Begun`] if the relay has already sent, received or computed something. The relay is then
     /// unchanged.
     pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
@@ -397,15 +397,15 @@ impl Relay {
 
 #[cfg(feature = "upload")]
 impl Relay {
-    /// Restores `upload`, the newest uploaded mission stored before the relay was switched off. The firmware stored
-    /// it on [`Event::Uploaded`](crate::Event::Uploaded).
+    /// Restores `upload`, the newest mission uploaded before the relay was switched off. The firmware stored it at
+    /// [`Event::Uploaded`](crate::Event::Uploaded).
     ///
-    /// Call it right after the relay was created, before any other input. Pass the mission that was loaded before
-    /// flight to [`Relay::new`], as without an upload. Takes constant time.
+    /// Call it right after the relay was created, before any other input. [`Relay::new`] still gets the mission that
+    /// was loaded before flight. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Base`] if the upload replaces another loaded mission, [`UploadError::Line`] if it does
-    /// not fit the positions of Tx and Rx or the geofence, and [`UploadError::Begun`] if the relay has already
+    /// Returns [`UploadError::Base`] if the upload replaces another loaded mission. Returns [`UploadError::Line`] if it
+    /// does not fit the positions of Tx and Rx or the geofence. Returns [`UploadError::Begun`] if the relay has already
     /// started. The relay is then unchanged.
     pub fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         self.node.resume(upload)
@@ -415,9 +415,9 @@ impl Relay {
     /// adopts it like any other upload. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if the upload replaces another
-    /// loaded mission, [`UploadError::Line`] if it does not fit the positions of Tx and Rx or the geofence, and
-    /// [`UploadError::Old`] if the relay has already stored this mission or a newer one.
+    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, and [`UploadError::Base`] if the upload replaces
+    /// another loaded mission. Returns [`UploadError::Line`] if it does not fit the positions of Tx and Rx or the
+    /// geofence. Returns [`UploadError::Old`] if the relay has already stored this mission or a newer one.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(self.clock.advance(now), upload)
     }
@@ -434,10 +434,10 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the current setpoint in metres in the mission's frame; `None` before the first agreement.
+    /// Returns the current setpoint, m in the mission's frame; `None` before the first agreement.
     ///
-    /// Without a guard it is the agreed position. With `Settings::guard` (collision avoidance) it is the safe position
-    /// closest to the agreed position.
+    /// Without a guard it is the position that the chain has agreed on. With `Settings::guard` (collision avoidance) it
+    /// is the safe position closest to it.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -451,15 +451,16 @@ impl Relay {
         self.node.setpoint()
     }
 
-    /// Returns the agreed position, which the guard does not limit; `None` before the first agreement. The guard is
-    /// the collision avoidance.
+    /// Returns the position that the chain has agreed on for this relay; `None` before the first agreement.
+    ///
+    /// The guard (collision avoidance) does not limit this position, only the setpoint.
     pub fn agreed_place(&self) -> Option<Placement> {
         self.node.agreed_place()
     }
 
     /// Returns false if the drone and a neighbour that flies to setpoints are in the wrong order along x.
     ///
-    /// The pilot must then first fly the drone to its own side of that neighbour. `Autopilot::exchange` gives this
+    /// The pilot must then first fly the drone to the right side of that neighbour. `Autopilot::exchange` passes this
     /// value to the autopilot link.
     ///
     /// ```
@@ -474,14 +475,15 @@ impl Relay {
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
     }
 
-    /// Returns the reason why the guard (collision avoidance) holds the drone back on `side`; else `None`.
+    /// Returns the reason why the guard holds the drone back on `side`; otherwise `None`.
     ///
-    /// While the drone does not fly to setpoints only [`HoldReason::Order`] is possible. `None` also without a guard.
+    /// The guard is the collision avoidance. While the drone does not fly to setpoints, only [`HoldReason::Order`] is
+    /// possible. `None` also without a guard.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
     }
 
-    /// Returns the bearing from the setpoint to the next node at `side`: a relay, or Tx or Rx.
+    /// Returns the direction from the setpoint to the next node at `side`: a relay, Tx or Rx.
     ///
     /// `None` without a setpoint, and while the position of that relay is unknown. Relays send their positions only
     /// if they have a guard.
@@ -489,29 +491,30 @@ impl Relay {
         Bearing::between(self.setpoint()?, self.node.place_toward(side)?)
     }
 
-    /// Returns the target SIR that every hop of the agreed chain meets, linear. `None` before an agreement or without
+    /// Returns the target SIR that every hop of the agreed chain meets, linear. `None` before an agreement, and without
     /// known interference.
     pub fn target(&self) -> Option<f32> {
         let known = !matches!(self.mission().interference(), Interference::Unknown);
         self.node.round().target().filter(|_| known)
     }
 
-    /// Returns begin and end of this relay's slots at the agreed positions, as shares of the frame.
+    /// Returns the start and end of this relay's slots at the agreed positions, as fractions of the frame.
     ///
-    /// `None` unless the mission has fitted slots (`fitted_gap` above 0). Also `None` from the acceptance of a view
-    /// (another mission or other relays) to the agreement in it, after the lease has expired, and without a quorum.
+    /// `None` unless the mission has fitted slots (`fitted_gap` above 0). Also `None` after the lease has expired,
+    /// without a quorum, and after the acceptance of a view (another mission or other relays) until the agreement in
+    /// it.
     ///
-    /// The slots of all hops fill the frame. They change when the verdict of an agreement reaches this relay: from the
-    /// last relay to the leader, hop by hop. Until the verdict has passed all relays, some have the new slots, and the
-    /// others the old ones or none. [`Event::Converged`] reports that this relay has agreed.
+    /// The slots of all hops fill the frame. They change when the result of an agreement reaches this relay: from the
+    /// last relay to the leader, hop by hop. Until it has passed all relays, some have the new slots, and the others
+    /// the old ones or none. [`Event::Converged`] reports that this relay has agreed.
     pub fn slot_shares(&self) -> Option<SlotShares> {
         self.node.slot_shares()
     }
 
-    /// Returns an upper bound of the worst hop's SIR for any positions at the current altitudes, linear.
+    /// Returns an upper bound of the worst hop's SIR at the current altitudes, for any x, linear.
     ///
-    /// The leader (the relay that starts the search) knows it after Algorithm 1 or 4. `None` at other relays, and
-    /// with the paper's fixed-step schedule, which gives no such bound.
+    /// The leader (the relay that starts the search) knows it after Algorithm 1 or 4. `None` at other relays, and with
+    /// the paper's fixed-step schedule, which gives no such bound.
     pub fn bound(&self) -> Option<f32> {
         self.node.round().bound()
     }
@@ -529,13 +532,12 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive, because another node with its number has precedence. Each node draws a
-    /// random claim number at its start. Of two nodes with one node number, the larger epoch has precedence, then the
-    /// larger claim number.
+    /// Returns true while this relay is passive, because another node with its number has precedence.
     ///
-    /// A passive relay has no setpoint and takes no part in the protocol. It becomes active once the other node has
-    /// been silent for twice `Settings::dead_after`, or when [`clear_duplicate_index`](Self::clear_duplicate_index)
-    /// is called.
+    /// Each node draws a random claim number at its start. Of two nodes with one node number, the larger epoch has
+    /// precedence, then the larger claim number. A passive relay has no setpoint and takes no part in the protocol. It
+    /// becomes active once the other node has been silent for twice `Settings::dead_after`, or when
+    /// [`clear_duplicate_index`](Self::clear_duplicate_index) is called.
     pub fn is_passive(&self) -> bool {
         self.node.is_passive()
     }
@@ -556,20 +558,20 @@ impl Relay {
 
     /// Returns the relay's index in the accepted view: 1 next to Tx, up to the number of relays.
     ///
-    /// The number of relays is that of [`mission`](Self::mission).
+    /// [`mission`](Self::mission) has the number of relays.
     pub fn index(&self) -> u16 {
         self.node.member().index
     }
 
-    /// Returns the last accepted view (agreed members of the chain), to which all positions belong.
+    /// Returns the identifier of the last accepted view (list of the chain's members).
     pub fn view(&self) -> ViewId {
         self.node.member().view
     }
 
-    /// Returns the time at which the lease of the agreement expires; `None` while there is no lease.
+    /// Returns the time at which this relay's lease expires; `None` while there is no lease.
     ///
-    /// Until that time no other relay uses another agreement. If the lease is not renewed by then, the relay requests
-    /// a new view (agreed members of the chain), and keeps its setpoint.
+    /// Until that time no other relay uses positions of a later view. If the lease is not renewed by then, the relay
+    /// requests a new view (list of the chain's members), and keeps its setpoint.
     pub fn lease(&self) -> Option<Instant> {
         let until = self.node.lease()?;
         Some(self.clock.external(until))
@@ -577,41 +579,40 @@ impl Relay {
 
     /// Returns the node numbers of the neighbours toward Tx and toward Rx; `None` for no neighbour.
     ///
-    /// A node number is the index that a relay was configured with; no view changes it.
+    /// A node number is the index with which a relay was configured. View changes do not change it.
     pub fn neighbours(&self) -> [Option<u16>; 2] {
         self.node.neighbours()
     }
 
-    /// Returns the active mission; its number of relays is that of the view (agreed members of the chain).
+    /// Returns the active mission. Its number of relays is that of the accepted view.
     pub fn mission(&self) -> &Mission {
         &self.node.member().mission
     }
 
     /// Returns the positions of Tx and Rx in the active mission; `None` if the configured positions apply.
     ///
-    /// All positions of relays are measured along the line from Tx to Rx. After a change of Tx or Rx, use the new line
-    /// to convert positions to latitude and longitude.
+    /// The x of all relays is measured along the line from Tx to Rx. After a change of Tx or Rx, use the new line to
+    /// convert positions to latitude and longitude.
     pub fn sites(&self) -> Option<Sites> {
         self.node.sites()
     }
 
-    /// Returns the interference at this relay's position, as estimated from its own measurements. It is for missions
-    /// with an interference field (a known distribution along x). `None` before there are enough measurements.
+    /// Returns the interference at this relay's position, as estimated from its measurements. Only for missions whose
+    /// interference is known as a function of x (a field). `None` before there are enough measurements.
     pub fn estimate(&self) -> Option<Estimate> {
         self.node.round().meter().estimate()
     }
 
     /// Returns Upsilon = E[1/I], 1/W, of the interference power I that this relay has measured.
     ///
-    /// `None` before there are enough measurements. Until then the relay uses the value of the mission's interference
-    /// field.
+    /// `None` before there are enough measurements. Until then the relay uses the interference field of the mission.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
     }
 
-    /// Returns the chain's newest estimate of the interferer, with the number of the estimate.
+    /// Returns the chain's newest estimate of the interferer, and its number.
     ///
-    /// Until the chain has an estimate, the result is the interferer that the mission configures.
+    /// Before the first estimate it is the interferer that the mission configures.
     pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
@@ -624,8 +625,8 @@ impl Relay {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns the reason why the last measurements gave no estimate of the interferer. `None` if they gave one, and
-    /// at other relays than the leader (the relay that starts the search).
+    /// Returns the reason why the last measurements gave no estimate of the interferer. `None` if they gave one, and at
+    /// all relays except the leader (the relay that starts the search).
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
@@ -637,15 +638,14 @@ impl Relay {
         self.node.round().rounds()
     }
 
-    /// Returns the relay's transmit power, and its last agreed altitude.
+    /// Returns the relay's transmit power, and the altitude that the chain agreed on last.
     pub fn profile(&self) -> Profile {
         self.node.round().profile()
     }
 }
 
 impl Relay {
-    /// Processes a measurement of the interference. Its kind must be enabled by `Settings::measure` or
-    /// `Settings::listen`.
+    /// Processes a measurement of the interference. `Settings::measure` or `Settings::listen` must enable its kind.
     ///
     /// Takes constant time. Unusable samples are counted as
     /// [`Stats::samples_rejected`](crate::Stats::samples_rejected).
@@ -668,8 +668,8 @@ impl Relay {
 
     /// Processes the drone's position `place`, measured at time `measured_at`. Takes constant time.
     ///
-    /// A guard (collision avoidance) gives no setpoint before the first position. A position that is not a number, or
-    /// farther than 1e7 m, is ignored.
+    /// A guard (collision avoidance) gives no setpoint before the first position. A position is ignored if it is not a
+    /// number or farther than 1e7 m away.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -690,11 +690,11 @@ impl Relay {
             .handle_position(now, place, self.clock.internal(measured_at));
     }
 
-    /// Records that the drone flies to the setpoints from now on (`flown`) or not; initially true. Takes constant time.
+    /// Records whether the drone flies to the setpoints from now on (`flown`); initially true. Takes constant time.
     ///
     /// Pass false while a pilot controls the drone or it is on the ground. With `Settings::guard`, the relay then has
-    /// no setpoint, and its neighbours are informed that the drone can be anywhere: they keep their positions toward
-    /// it. Once `flown` is true again, the relay starts as after power-up, with the next position from
+    /// no setpoint. Its neighbours are informed that the drone can be anywhere, and come no nearer to it. Once `flown`
+    /// is true again, the relay starts as after power-up, with the next position from
     /// [`handle_position`](Self::handle_position). A repeated call with the same value has no effect.
     ///
     /// ```
@@ -711,8 +711,7 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Records that the drone flies to the setpoints (`flown` is true) or does not (false). See
-    /// [`handle_control`](Self::handle_control).
+    /// Records whether the drone flies to the setpoints (`flown`). See [`handle_control`](Self::handle_control).
     ///
     /// Returns true if this changes the state of the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
@@ -721,7 +720,7 @@ impl Relay {
         self.node.handle_control(now, flown)
     }
 
-    /// Records the control state of the drone, for the reports to a ground station that watches.
+    /// Records the control state of the drone, for the reports to a ground station.
     ///
     /// `refuses` is true while the autopilot flies to a target other than the setpoint.
     #[cfg(feature = "telemetry")]
@@ -737,12 +736,12 @@ impl Relay {
         self.node.report_control(control);
     }
 
-    /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See
+    /// Reports that relays on `side` that were lost or under a pilot's control are no longer in the air. See
     /// [`handle_control`](Self::handle_control).
     ///
     /// The guard (collision avoidance) no longer keeps clear of these relays. If the view has other relays on that
-    /// side, the guard keeps the drone from moving toward them until it has received the nearest of them. If this relay
-    /// is lost before that, call the function again. Takes constant time.
+    /// side, the drone does not move toward them yet. The guard first has to receive the nearest of them. If that relay
+    /// is lost before, call the function again. Takes constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }
@@ -750,8 +749,8 @@ impl Relay {
     /// Reports that the other node with this relay's node number is gone. See
     /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
-    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above the claim
-    /// number of the other node. Only the node with the larger claim number is allowed to have a setpoint. Takes
+    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above that of the
+    /// other node. Of two nodes with one number, only the node with the larger claim number may have a setpoint. Takes
     /// constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
@@ -763,10 +762,10 @@ impl Relay {
     /// Requests to leave the chain, because the drone has to land soon. `endurance_s` is the remaining endurance of the
     /// drone, s; `None` if it is unknown. Call it again when the endurance changes.
     ///
-    /// The relay holds its place until [`Event::MayLeave`]. A departure needs a guard, or
+    /// The relay keeps its position until [`Event::MayLeave`]. A departure needs a guard, or
     /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). If `leave` is called right after a
-    /// start, the relay joins the chain only if the chain turns out to need this relay. See
-    /// [`docs::batteries`](crate::docs::batteries). Takes constant time.
+    /// start, the relay joins the chain only if the chain needs it. See [`docs::batteries`](crate::docs::batteries).
+    /// Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -785,9 +784,9 @@ impl Relay {
 
     /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
     ///
-    /// Call it right after the start: it has no effect once the relay has taken part in a pass or a view change. The
-    /// first leader cannot be a spare, nor can a relay with two wires. No guard knows the place of a waiting spare: it
-    /// has to wait at least the separation away from all positions of the chain. Takes constant time.
+    /// Call it right after the start: it has no effect once the relay has taken part in an agreement or a view change.
+    /// The first leader cannot be a spare, nor can a relay with two wires. No guard knows where a waiting spare is. It
+    /// must wait at least the separation away from all positions of the chain. Takes constant time.
     pub fn wait_as_spare(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.wait_as_spare(now);
@@ -797,7 +796,7 @@ impl Relay {
     ///
     /// From now on the relay requests to leave only if the firmware calls [`leave`](Self::leave), or if the margin
     /// becomes too small. The margin is the remaining flight time minus the time of the way home (`handle_endurance`).
-    /// Too small means: below the usual limit, and below half of the margin at this call.
+    /// It is too small below the usual limit and below half of the margin at this call.
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.override_endurance(now, true);

@@ -1,4 +1,4 @@
-//! Frames to and from the protocol: address and tag are checked before a message is decoded.
+//! Frames to and from the protocol. Address and tag of a frame are checked before its message is decoded.
 
 use super::Port;
 use crate::node::Node;
@@ -12,7 +12,7 @@ use crate::wire::session::{Checked, Rival, Sender, Session};
 
 /// Number of unanswered heartbeat requests to a neighbour after which a handshake requests a reply.
 ///
-/// The reply shows if the neighbour has mistaken another node with this relay's number for this relay.
+/// The reply shows whether the neighbour takes another node with this relay's number for this relay.
 const QUESTIONS: u16 = 4;
 
 /// Handles an intact frame of this relay's network, received at `port`.
@@ -55,7 +55,7 @@ pub(super) fn receive(
     }
 }
 
-/// Handles a frame whose sender number is this relay's own.
+/// Handles a frame whose sender has this relay's node number.
 fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: &Opened<'_>) {
     if let Some(session) = endpoint.session() {
         return node.on_duplicate_index(now, session.sender(frame));
@@ -98,7 +98,8 @@ fn receive_signed(
     side: Side,
     frame: &Opened<'_>,
 ) {
-    // A passive relay waits for the other node itself: neighbours also show the nonce of a node that is gone.
+    // A passive relay waits until it receives the other node itself. Neighbours also show the nonce of a node that is
+    // gone.
     if let Some(rival) = rival
         && !node.is_passive()
     {
@@ -135,8 +136,8 @@ fn decode(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     bump(counter);
 }
 
-/// Writes the next frame into `frame`, and returns its destination and length. Handshakes come before messages;
-/// `None` if nothing is pending.
+/// Writes the next frame into `frame`, and returns its destination and length. `None` if nothing is pending. Handshakes
+/// come before messages.
 pub(super) fn poll_transmit(
     node: &mut Node,
     endpoint: &mut Endpoint,
@@ -169,7 +170,7 @@ pub(super) fn poll_transmit(
     if let Some(session) = endpoint.session_mut() {
         schedule_handshake(node, session, to, &message);
         if matches!(message, Message::Watch { .. } | Message::Report(_)) && !session.knows(to) {
-            // The neighbour knows this relay. The next report goes to the node itself, if the handshake succeeds.
+            // The neighbour knows this relay. If the handshake succeeds, the next report goes to the neighbour.
             session.greet(to);
             let [before, after] = node.neighbours();
             let near = match side {
@@ -182,7 +183,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules a handshake to node `to` if `message`, which is sent to it, makes one necessary.
+/// Schedules a handshake to node `to` if `message` to this node makes one necessary.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0
@@ -197,7 +198,7 @@ fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Mes
         && hello.requests_reply
         && !hello.is_heard(node.member().node, to)
     {
-        // The node may have restarted: then it accepts only handshakes and sends nothing by itself.
+        // The node may have restarted. Then it accepts only handshakes, and sends nothing without a request.
         session.request_reply_of_silent(to);
     }
 }

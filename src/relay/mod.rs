@@ -1,4 +1,4 @@
-//! Interface to the firmware. Bytes in, frames, events and setpoints out, without input or output of its own.
+//! Interface to the firmware: bytes in, frames, events and setpoints out. Does no input or output.
 //!
 //! | file | content |
 //! | --- | --- |

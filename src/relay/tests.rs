@@ -1,4 +1,4 @@
-//! Tests of the end of the frame counter's range, which sending frames would not reach in a test.
+//! Tests at the end of the frame counter's range, which sent frames would not reach in a test.
 
 use super::Relay;
 use crate::mission::tests::paper;

@@ -1,4 +1,4 @@
-//! Serial link: received bytes, transmit queue, driver-enable pin, and counters of local faults.
+//! Serial link: received bytes, transmit queue, driver-enable pin, and error counters.
 
 use super::port::{Fault, SerialPort};
 use crate::relay::{Port, Relay};
@@ -9,18 +9,18 @@ use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
 
-/// Maximum number of bytes, and of failed reads, that one poll takes from one port.
+/// Maximum number of bytes, and of failed reads, per poll and port.
 #[doc(hidden)] // public because the documentation of public functions links to it
 pub const READ_LIMIT: usize = 64;
 
 /// Capacity of the transmit queue, bytes: the frame that the port is sending, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
 
-/// Maximum pause, in byte times, before the next attempt to write to a port that accepts nothing.
+/// Maximum pause before the next write to a port that accepts nothing, in byte times.
 const LONGEST_PAUSE: u32 = 128;
 
-/// Placeholder type of the driver-enable pin for a link without such a pin. The link is full duplex, or a radio that
-/// switches between sending and receiving by itself.
+/// Placeholder type for a link without a driver-enable pin. Such a link is full duplex, or its radio switches between
+/// sending and receiving.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NoPin {}
 
@@ -38,10 +38,9 @@ impl OutputPin for NoPin {
     }
 }
 
-/// Returns the duration of a byte at `baud` bit/s, rounded up to a microsecond. A byte has a start bit, 8 data bits
-/// and a stop bit.
+/// Returns the duration of a byte at `baud` bit/s, rounded up to a microsecond.
 ///
-/// `baud` is at least 1; 0 counts as 1.
+/// A byte has a start bit, 8 data bits and a stop bit. `baud` is at least 1; 0 counts as 1.
 pub(crate) const fn byte_time(baud: u32) -> Duration {
     let baud = if baud == 0 { 1 } else { baud as u64 };
     Duration::from_micros(10_000_000_u64.div_ceil(baud))
@@ -49,26 +48,26 @@ pub(crate) const fn byte_time(baud: u32) -> Duration {
 
 /// Serial port of a relay with its transmit queue, and its driver-enable pin if it has one.
 ///
-/// The pin is high from before the first byte of a frame until the last bit of the last queued frame has left, and low otherwise.
-/// An [`Nb`](super::Nb) port reports that; for an [`Io`](super::Io) port it is computed from the byte time, conservatively: every
-/// byte counts from the first poll after the one that wrote it.
+/// The pin is high from before the first byte of a frame until the last bit of the last queued frame has left, and low
+/// otherwise. An [`Nb`](super::Nb) port reports when that bit has left. For an [`Io`](super::Io) port the time is
+/// computed from the byte time, conservatively: every byte counts from the poll after the one that wrote it.
 #[derive(Debug)]
 pub struct SerialLink<P, D = NoPin> {
     port: P,
     pin: Option<D>,
-    /// Level at which the driver-enable pin was last set; `None` before the first time and after an error.
+    /// Last level of the driver-enable pin; `None` before the first one and after an error.
     level: Option<bool>,
     byte_time: Duration,
     waiting: Deque<u8, QUEUE>,
     clock: MonotonicClock,
-    /// Time at which the port last accepted a byte, or at which a byte was queued in the empty queue.
+    /// Time at which the port last accepted a byte, or at which a byte entered the empty queue.
     moved_at: Instant,
-    /// Number of bytes written by the last poll. Their transmission time counts from the next poll on, because the
-    /// exact time of writing is unknown.
+    /// Number of bytes written by the last poll. Their transmission time counts from the next poll, because the exact
+    /// time of writing is unknown.
     uncounted: u32,
     /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
-    /// True if the last poll stopped reading at its limit. The port can then have more bytes.
+    /// True if the last poll stopped reading at its limit, so that the port can have more bytes.
     unread: bool,
     stats: SerialStats,
 }
@@ -84,7 +83,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
     /// Creates a half-duplex link over `port` at `baud` bit/s, with 10 bits per byte. The driver-enable pin is high
     /// while this relay sends.
     ///
-    /// The first poll sets the pin low, unless it has something to send.
+    /// The first poll sets the pin low, unless there is something to send.
     pub fn half_duplex(port: P, baud: u32, pin: D) -> Self {
         Self::with_pin(port, baud, Some(pin))
     }
@@ -107,7 +106,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Sets the driver-enable pin high, if there is one. Returns false if that fails: bytes must then not be sent.
+    /// Sets the driver-enable pin high, if there is one. Returns false if that fails: then no bytes may be sent.
     fn raise(&mut self) -> bool {
         if let Some(pin) = &mut self.pin
             && self.level != Some(true)
@@ -145,34 +144,34 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P, D> SerialLink<P, D> {
-    /// Returns the counters of received bytes and errors since the link was created.
+    /// Returns the counters since the link was created.
     pub fn stats(&self) -> &SerialStats {
         &self.stats
     }
 
-    /// Returns the port, for functions of its driver, for example to set another baud rate.
+    /// Returns the port, for example to set another baud rate by its driver.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// Returns the port and the direction pin. The transmit queue is discarded, and the pin keeps its level.
+    /// Returns the port and the driver-enable pin. The transmit queue is discarded, and the pin keeps its level.
     pub fn release(self) -> (P, Option<D>) {
         (self.port, self.pin)
     }
 }
 
 pub(super) trait FrameLink {
-    /// Passes up to [`READ_LIMIT`] received bytes to `relay`, as bytes from its port `port`.
+    /// Passes up to [`READ_LIMIT`] received bytes to `relay`, as bytes at its `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
     /// Returns true if one more frame of any length fits into the transmit queue.
     fn has_room(&self) -> bool;
-    /// Queues a frame for sending. If the frame does not fit, it is dropped and counted.
+    /// Queues a frame for sending. A frame that does not fit is dropped and counted.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame that was dropped because it is for a port that this driver does not have.
+    /// Counts a frame dropped because this driver does not have its port.
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);
-    /// Returns the time by which this link must be polled again, later than `now`. `None` if it has nothing to do.
+    /// Returns the time by which this link must be polled again, later than `now`. `None` if nothing is pending.
     fn wake(&self, now: Instant) -> Option<Instant>;
 }
 
@@ -251,7 +250,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
         if self.unread || (driving && self.waiting.is_empty()) {
             return Some(now + self.byte_time);
         }
-        // A port that accepts nothing is next tried after the time for which it has been stuck.
+        // A port that accepts nothing is tried again after a pause as long as the time since it last accepted a byte.
         let longest = self.byte_time.times(LONGEST_PAUSE);
         let stuck = self.clock.internal(now).since(self.moved_at);
         let pause = stuck.min(longest).max(self.byte_time);
@@ -259,7 +258,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
     }
 }
 
-/// Counters of one link since it was created; each saturates at its maximum.
+/// Counters of one link since it was created. Each saturates at its maximum.
 ///
 /// Errors in received frames are counted in [`Stats`](crate::Stats).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -275,16 +274,15 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads from the serial port that failed for another reason.
     pub other: u32,
-    /// Number of failed writes to the port, plus failed queries if all bytes have left the port. Failed writes are
-    /// repeated.
+    /// Number of failed writes, and of failed queries whether all bytes have left the port. Failed writes are repeated.
     pub write: u32,
-    /// Number of failed attempts to set the driver-enable pin. Each is repeated.
+    /// Number of failed attempts to set the driver-enable pin. Each attempt is repeated.
     pub pin: u32,
-    /// Number of frames dropped because the transmit queue was full: the port accepts nothing. The relay sends
+    /// Number of frames dropped because the transmit queue was full, as the port accepts nothing. The relay sends
     /// important frames again.
     pub dropped: u32,
-    /// Number of frames for a port that this driver does not have. The relay's [`Wiring`](crate::Wiring) then does
-    /// not match the driver.
+    /// Number of frames for a port that this driver does not have. The relay's [`Wiring`](crate::Wiring) then does not
+    /// match the driver.
     pub unrouted: u32,
 }
 

@@ -3,27 +3,29 @@
 //! | file | content |
 //! | --- | --- |
 //! | [`port`] | a port that never blocks, based on [`embedded_hal_nb`] ([`Nb`]) or [`embedded_io`] ([`Io`]) |
-//! | [`link`] | one port with its transmit queue, its driver-enable pin and counters of local faults |
+//! | [`link`] | one port with its transmit queue, driver-enable pin and error counters |
 //! | [`queue`] | queues between an interrupt and the main loop, for a UART that holds one byte |
 //! | this one | the relay and its links: [`Pair`] for [`Wiring::Pair`](crate::Wiring::Pair), [`Shared`] for
 //! [`Wiring::Shared`](crate::Wiring::Shared) |
 //!
 //! # One call
-//! `poll` reads up to 64 bytes per port into the relay, lets it handle due timers, polls its frames, and writes as
-//! many bytes as fit. Afterwards poll the relay's events, and sleep until the returned time or until a byte is received,
-//! whichever is first. The time is always later than `now`. With bytes still to be written or read, or a pin to be set low, it is
-//! one byte time ahead, which keeps a line without a FIFO busy. A port that accepts nothing is tried less and less often, at last
-//! every 128 byte times; if it can, let it wake the main loop when it accepts bytes again.
+//! `poll` reads up to 64 bytes per port into the relay, lets it handle due timers, polls its frames, and writes as many
+//! bytes as fit. Afterwards poll the relay's events, and sleep until the returned time or until a byte is received,
+//! whichever is first. The time is always later than `now`. If bytes must still be written or read, or a pin must be
+//! set low, it is one byte time ahead, which keeps a UART without a FIFO busy. A port that accepts nothing is tried
+//! less and less often, at last every 128 byte times. If the port can, let it wake the main loop when it accepts bytes
+//! again.
 //!
 //! # A UART that holds one byte
 //! Between two polls a relay may compute for 3 ms (16 MHz), and at 115 200 baud a byte lasts 87 us. A UART without a FIFO or DMA
 //! needs an interrupt that moves the bytes: [`ByteQueues`] has both ends, and [`queue_depth`] returns the required depth. For
 //! asynchronous ports use `asynch` (feature `async`).
 //!
-//! # What does not fit
+//! # Full queues
 //! A link has room for two frames of maximum length. A frame that does not fit is dropped and counted in
-//! [`SerialStats::dropped`]: that neighbour's port accepts nothing, and the other neighbour must not wait for it. With one shared
-//! port no frame is dropped; frames stay in the relay until there is room. Faults of the ports are counted, never returned.
+//! [`SerialStats::dropped`], because the other neighbour must not wait for a port that accepts nothing. With one shared
+//! port no frame is dropped; frames stay in the relay until there is room. Errors of the ports are counted, never
+//! returned.
 //!
 //! # Example
 //! Main loop of a firmware, with a substitute for the HAL's port. A HAL with ports of an older `embedded_io` (such as 0.6) can be
@@ -142,10 +144,10 @@ impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, 
     }
 }
 
-/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus
-/// with a driver-enable pin.
+/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus with
+/// a driver-enable pin.
 ///
-/// The modem controls the access to the channel; this crate only keeps relays from retransmitting at the same times.
+/// The modem controls the access to the channel. This crate only keeps relays from retransmitting at the same times.
 #[derive(Debug)]
 pub struct Shared<P, Pin = NoPin> {
     /// Serial link to the modem of the channel that all nodes share.
@@ -167,14 +169,15 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {
-            /// Moves all bytes that can be moved. Returns the latest time of the next call, always later than `now`.
+            /// Moves all bytes that can be moved. Returns the time by which it must be called again, always later than
+            /// `now`.
             ///
-            /// Work: at most 64 bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and
-            /// the relay's pending frames; for a shared port, as many as fit.
+            /// Work: at most 64 bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
+            /// relay's pending frames; for a shared port, as many as fit.
             ///
-            /// `store` writes a [changed record](Relay::unpersisted) to memory that survives a reboot, and returns true if it is
-            /// stored; until then the relay sends nothing. Without such memory pass `|_| true`, and leave the relay off
-            /// after a reboot in flight.
+            /// `store` writes a [changed record](Relay::unpersisted) to memory that survives a reboot, and returns true
+            /// if it is stored. Until then the relay sends nothing. Without such memory pass `|_| true`, and leave the
+            /// relay off after a reboot in flight.
             pub fn poll(
                 &mut self,
                 now: Instant,

@@ -3,13 +3,13 @@
 use embedded_hal_nb::nb;
 use embedded_hal_nb::serial::{Error as _, ErrorKind};
 
-/// Error that this relay's serial port reports, in most cases for a received byte.
+/// Error reported by the serial port, in most cases for a received byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Overrun: a byte was received before the previous byte was read.
+    /// A byte was received before the previous byte was read.
     Overrun,
-    /// Byte without a stop bit: another baud rate, a break, a loose wire.
+    /// The byte had no stop bit: another baud rate, a break, a loose wire.
     Framing,
     /// The serial port received a byte with the wrong parity bit.
     Parity,
@@ -31,8 +31,7 @@ error_texts!(Fault {
 ///
 /// [`Nb`] and [`Io`] adapt a HAL's port; a firmware with its own queues or DMA can implement it directly.
 pub trait SerialPort {
-    /// Moves received bytes to the front of `into` (never empty), and returns their number. 0 if no byte was
-    /// received.
+    /// Moves received bytes to the front of `into` (never empty), and returns their number. 0 if there are none.
     ///
     /// # Errors
     /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
@@ -44,15 +43,14 @@ pub trait SerialPort {
     /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault>;
 
-    /// Returns true if the last bit of all accepted bytes has left the port; `None` if that is unknown.
+    /// Returns true if the last bit of all accepted bytes has left the port; `None` if unknown.
     ///
     /// # Errors
     /// [`Fault`] if the query fails; it is treated as `None`.
     fn has_left(&mut self) -> Result<Option<bool>, Fault>;
 }
 
-/// Port for a HAL with [`embedded_hal_nb`] traits. It moves one byte per call, and can report that the last byte has
-/// left.
+/// Port with [`embedded_hal_nb`] traits. It moves one byte per call, and can report that the last byte has left.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Nb<S>(pub S);
 
@@ -88,7 +86,7 @@ where
     }
 }
 
-/// Converts the result of an `nb` call. `None` stands for `WouldBlock`, which means that the call would have to wait.
+/// Converts the result of an `nb` call. `None` means `WouldBlock`: the call would have to wait.
 fn ready<S, T>(result: nb::Result<T, S::Error>) -> Result<Option<T>, Fault>
 where
     S: embedded_hal_nb::serial::ErrorType,
@@ -108,10 +106,10 @@ where
 
 /// Port with [`embedded_io`] traits.
 ///
-/// Its `read` and `write` may block. Each is called only after the port has reported that the call will not block.
-/// Its `flush` may block and is never called. So the port cannot report when the last byte has left, and a
-/// driver-enable pin uses the byte time instead. For this the port must send at once and without gaps. A UART with a
-/// FIFO or a ring buffer does so; a USB adapter does not.
+/// Its `read` and `write` may block, so each is called only after the port has reported that it will not block. Its
+/// `flush` may block and is never called. So the port cannot report when the last byte has left, and a driver-enable
+/// pin uses the byte time instead. For this the port must send at once and without gaps. A UART with a FIFO or a ring
+/// buffer does so; a USB adapter does not.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Io<S>(pub S);
 

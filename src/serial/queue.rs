@@ -1,10 +1,12 @@
 //! Byte queues between an interrupt and the main loop, for a UART without a FIFO.
 //!
-//! Such a UART holds one byte. At 115 200 baud the next one overwrites it after 87 us, and a call of a [`Relay`](crate::Relay)
-//! may take 3 ms at 16 MHz, so a main loop that reads the port between calls loses bytes. An interrupt therefore moves bytes
-//! between the UART and two queues, whose other ends the main loop has. Neither end waits for the other or disables interrupts. A
-//! UART with DMA, with a FIFO as deep as [`queue_depth`] returns, or with a buffered HAL driver (all of Embassy's
-//! `BufferedUart`s) needs none of this.
+//! Such a UART holds one byte. At 115 200 baud the next one overwrites it after 87 us. A call of a
+//! [`Relay`](crate::Relay) may take 3 ms at 16 MHz, so a main loop that reads the port between calls loses bytes. An
+//! interrupt therefore moves bytes between the UART and two queues, whose other ends the main loop has. Neither end
+//! waits for the other or disables interrupts.
+//!
+//! No queue is needed for a UART with DMA, with a FIFO as deep as [`queue_depth`] returns, or with a buffered HAL
+//! driver (all of Embassy's `BufferedUart`s).
 //!
 //! ```
 //! use core::cell::Cell;
@@ -41,8 +43,9 @@
 //! # Ok::<(), uav_relay::serial::Fault>(())
 //! ```
 //!
-//! Each queue is a lock-free ring of atomic cells with one producer and one consumer. heapless's `spsc` is not used: it cannot be shown to be free of panics, because its ends do not know its length and so divide
-//! and index by a possible zero, and its cells are accessed by unsafe code.
+//! Each queue is a lock-free ring of atomic cells with one producer and one consumer. heapless's `spsc` is not used,
+//! because it cannot be shown to be free of panics. Its ends do not know its length, and so divide and index by a
+//! possible zero. Its cells are accessed by unsafe code.
 
 use core::fmt;
 use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicUsize, Ordering};
@@ -52,8 +55,8 @@ use crate::time::Duration;
 
 /// Returns the necessary depth of the receive queue at `baud` bit/s, with 10 bits per byte.
 ///
-/// It is the number of bytes received in `longest`, the maximum time between two reads of the main loop, plus three. Three are
-/// for one byte more, a marker of lost bytes, and a slot that a queue never uses.
+/// It is the number of bytes received in `longest`, the maximum time between two reads of the main loop, plus three.
+/// The three are one more byte, a marker of lost bytes, and a cell that a queue never uses.
 ///
 /// | baud | 3 ms | 10 ms | 50 ms |
 /// | --- | --- | --- | --- |
@@ -62,7 +65,8 @@ use crate::time::Duration;
 /// | 230 400 | 73 | 234 | 1 155 |
 /// | 921 600 | 280 | 925 | 4 611 |
 ///
-/// A flash write or erase may block the main loop for longer than any queue is deep; the relay retransmits what is lost then.
+/// A flash write or erase may block the main loop for longer than any queue is deep. The relay then retransmits what is
+/// lost.
 /// ```
 /// use uav_relay::{Duration, serial::queue_depth};
 ///
@@ -84,8 +88,7 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
-/// Trigger of a UART's interrupt, so that the interrupt handler starts to send. It is a closure, or a type of the
-/// firmware.
+/// Trigger of a UART's interrupt, which then starts to send: a closure, or a type of the firmware.
 pub trait Pend {
     /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);
@@ -150,12 +153,12 @@ impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
     }
 }
 
-/// Side of the queues for the interrupt handler. Every call takes constant work per byte.
+/// Interrupt handler's end of the queues. Every call takes constant work per byte.
 pub struct InterruptEnd<'q> {
     received: Producer<'q, AtomicU16>,
     outgoing: Consumer<'q, AtomicU8>,
     lost: &'q AtomicU32,
-    /// True from the loss of bytes until a [`Fault::Overrun`] has been queued in their place.
+    /// True from the loss of bytes until a [`Fault::Overrun`] is queued in their place.
     gap: bool,
 }
 
@@ -178,16 +181,15 @@ impl InterruptEnd<'_> {
         }
         if self.gap || !self.received.put(encode(item)) {
             self.gap = true;
-            // Only the interrupt writes it, so a load and a store are enough, which every core has.
+            // Only the interrupt writes this counter. So a load and a store, which every core has, are enough.
             let lost = self.lost.load(Ordering::Relaxed).saturating_add(1);
             self.lost.store(lost, Ordering::Relaxed);
         }
     }
 
-    /// Passes queued bytes to `take` until `take` returns false or no byte is left. Returns true if some bytes are
-    /// left.
+    /// Passes queued bytes to `take` until it returns false or no byte is left. Returns true if bytes are left.
     ///
-    /// If bytes are left, the interrupt for an empty data register must stay enabled; otherwise it must be disabled.
+    /// If bytes are left, the interrupt for an empty data register must stay enabled. Otherwise it must be disabled.
     pub fn send(&mut self, mut take: impl FnMut(u8) -> bool) -> bool {
         while let Some(byte) = self.outgoing.peek() {
             if !take(byte) {
@@ -199,7 +201,7 @@ impl InterruptEnd<'_> {
     }
 }
 
-/// Side of the queues for the main loop: a [`SerialPort`] that never waits for the UART.
+/// Main loop's end of the queues: a [`SerialPort`] that never waits for the UART.
 pub struct QueuedPort<'q, K> {
     received: Consumer<'q, AtomicU16>,
     outgoing: Producer<'q, AtomicU8>,
@@ -222,8 +224,8 @@ impl<K> QueuedPort<'_, K> {
         self.outgoing.room()
     }
 
-    /// Returns the number of received bytes lost because the queue was full. The main loop then has not read the
-    /// queue often enough.
+    /// Returns the number of received bytes lost because the queue was full. The main loop has not read it often
+    /// enough.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
@@ -286,8 +288,7 @@ const fn decode(code: u16) -> Result<u8, Fault> {
     }
 }
 
-/// Atomic cell of a ring buffer, for one item. Its own memory ordering is relaxed, because the indices of the ring
-/// synchronise the access.
+/// Atomic cell of a ring buffer. Its memory ordering is relaxed, because the ring's indices synchronise the access.
 pub(super) trait AtomicSlot {
     type Item: Copy;
 
@@ -319,8 +320,8 @@ impl AtomicSlot for AtomicU16 {
     }
 }
 
-/// Indices of a ring buffer: its first item, and the cell after its last item. The ring is empty if the two indices are
-/// equal, so one cell is never used.
+/// Indices of a ring buffer: first item, and cell after the last item. The ring is empty if they are equal, so one cell
+/// is never used.
 #[derive(Debug)]
 pub(super) struct RingIndices {
     first: AtomicUsize,
@@ -342,16 +343,16 @@ struct RingEnd<'q, P> {
     indices: &'q RingIndices,
 }
 
-/// Producer's side of a ring buffer, which appends items.
+/// Producer's end of a ring buffer, which appends items.
 #[derive(Debug)]
 pub(super) struct Producer<'q, P>(RingEnd<'q, P>);
 
-/// Consumer's side of a ring buffer, which takes items.
+/// Consumer's end of a ring buffer, which takes items.
 #[derive(Debug)]
 pub(super) struct Consumer<'q, P>(RingEnd<'q, P>);
 
-/// Returns the producer's and the consumer's side of a ring buffer. The exclusive borrow of `indices` prevents a second
-/// pair of sides.
+/// Returns the producer's and the consumer's end of a ring buffer. The exclusive borrow of `indices` prevents a second
+/// pair of ends.
 pub(super) fn ring_ends<'q, P>(
     slots: &'q [P],
     indices: &'q mut RingIndices,
@@ -371,7 +372,7 @@ impl<P> RingEnd<'_, P> {
 }
 
 impl<P: AtomicSlot> Producer<'_, P> {
-    /// Appends an item to the ring; returns false if the ring is full.
+    /// Appends an item to the ring. Returns false if the ring is full.
     pub(super) fn put(&mut self, item: P::Item) -> bool {
         let RingEnd { slots, indices } = &self.0;
         let end = indices.end.load(Ordering::Relaxed);
@@ -435,7 +436,7 @@ mod tests {
         assert_eq!(port.lost(), 5);
         let mut bytes = [0; 3];
         assert_eq!((port.read(&mut bytes), bytes), (Ok(3), [0, 1, 2]));
-        // Room for the overrun and the fault behind it.
+        // There is room for the overrun and the fault after it.
         interrupt.received(Ok(9));
         interrupt.received(Err(Fault::Noise));
         assert_eq!((port.read(&mut bytes), bytes[0]), (Ok(1), 3));

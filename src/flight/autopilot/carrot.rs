@@ -1,12 +1,12 @@
-//! Carrot: the target sent to the autopilot. It moves from the drone's position to the setpoint within the allowed speed.
+//! Carrot: the target sent to the autopilot. It moves from the drone's position to the setpoint.
 //!
-//! The carrot starts at the drone's position and accelerates by a. At the distance s from the setpoint its speed is at most k s
-//! near the setpoint, and sqrt(2 a (s - a / 2 k^2)) farther away, where it decelerates by a. Near the end the deceleration falls: a
-//! PX4 overshoots a target that stops with a constant deceleration.
+//! The carrot starts at the drone's position and accelerates by a. At the distance s from the setpoint its speed is at
+//! most k s near the setpoint. Farther away it is at most sqrt(2 a (s - a / 2 k^2)), where the carrot decelerates by a.
+//! Near the end the deceleration falls, because a PX4 overshoots a target that stops with a constant deceleration.
 //!
-//! An autopilot that lags behind its target catches up. It flies faster than the target by its lag times its gain, which is about 1
-//! /s, and by more while it accelerates. The carrot is therefore slower than allowed by that much, and the drone stays within the
-//! allowed speed.
+//! An autopilot that lags behind its target catches up. It flies faster than the target by its lag times its gain,
+//! which is about 1 /s. While it accelerates, it flies even faster. The carrot is slower than the speed limit by this
+//! difference, so that the drone stays within the limit.
 
 use crate::flight::autopilot::state::Kind;
 use crate::flight::axis::Axis;
@@ -14,7 +14,7 @@ use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// Distance to the setpoint, m, below which the moving target for the autopilot counts as arrived.
+/// Distance to the setpoint at which the moving target counts as arrived, m.
 const ARRIVED_M: f32 = 0.01;
 
 /// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s.
@@ -27,46 +27,44 @@ const END_SPEED_M_S: f32 = 0.2;
 /// than the target.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// Maximum speed of the moving target as a fraction of the speed limit. The rest is a margin, because a drone
-/// overshoots the speed of its target.
+/// Maximum speed of the moving target, as a fraction of the speed limit. The rest is a margin, because a drone flies
+/// faster than its target at times.
 const CARROT_PART: f32 = 0.96;
 
-/// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the
-/// difference of maximum speed and present speed.
+/// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the difference
+/// of maximum speed and present speed.
 ///
 /// The target approaches its maximum speed smoothly, because a drone does not stop accelerating at once.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum speed of the moving target, as a fraction of the speed limit. If the drone lags behind, the target slows
-/// down, at most to this speed.
+/// Minimum speed of the moving target as a fraction of the speed limit, while the drone lags behind.
 const LEAST_PART: f32 = 0.1;
 
 /// Factor on the acceleration limit for velocity that does not lead toward a new setpoint.
 ///
-/// When the setpoint changes, the moving target still has its old velocity. Its components across the new direction
-/// and away from the setpoint are reduced to 0 with twice the acceleration of [`Pace`], within
-/// [`Pace::stopping_time`]. The target does not turn at once, because the drone would then overshoot the target and
-/// come back.
+/// When the setpoint changes, the moving target still has its old velocity. The part of it toward the setpoint stays.
+/// Any other part is reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`]. The target
+/// does not turn at once, because the drone would then overshoot it and come back.
 const TURN_PART: f32 = 2.0;
 
-/// Remaining distance of the moving target to the setpoint at which a stop counts as complete, m. The drone lags
-/// behind the moving target, so that the drone then has up to 0.5 m left.
+/// Remaining distance of the moving target at which a stop counts as complete, m. The drone lags behind and then has up
+/// to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
-/// Assumed time from a new setpoint until the drone reacts, ms: 1200. The transmission to the flight controller takes
-/// 200 ms of this, and the drone's lag 1000 ms.
+/// Assumed time from a new setpoint until the drone reacts, ms. It includes 200 ms for the transmission to the flight
+/// controller, and 1000 ms for the drone's lag.
 const BEHIND_MS: u64 = 1_200;
 
-/// Time in which the speed of the moving target near the setpoint halves, ms. It is ln 2 / k: the speed is k times
-/// the remaining distance, with k = 0.5 /s.
+/// Time in which the speed of the moving target near the setpoint halves, ms: ln 2 / k with k = 0.5 /s. The speed is k
+/// times the remaining distance.
 const HALVES_MS: u64 = 1_387;
 
-/// Maximum number of half-lives of the speed that [`Pace::stopping_time`] counts. Eight of them reduce a remaining
+/// Maximum number of halvings of the speed that [`Pace::stopping_time`] counts. Eight of them reduce a remaining
 /// distance of 20 m to less than [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
-/// Maximum age of a drone's position that is used to compute the drone's lag behind the moving target. The drone's
-/// position is compared with the target's position of the same time.
+/// Maximum age of a drone's position from which its lag behind the moving target is computed. The position is compared
+/// with the target's position at the same time.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
 /// Maximum time step of the moving target. After a longer gap it continues from its last position, without a jump.
@@ -93,8 +91,8 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. `speed_m_s` is 0.1 to 20, or 0 for the
-    /// default speed limit.
+    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. The limit is 0.1 to 20, or 0 for the
+    /// default.
     pub fn of_speed(speed_m_s: f32) -> Self {
         let mut pace = Self::default();
         if speed_m_s > 0.0 {
@@ -103,10 +101,10 @@ impl Pace {
         pace
     }
 
-    /// Returns the maximum speed, m/s, of a moving target that has to stop after `left_m` more metres.
+    /// Returns the maximum speed of a moving target that must stop within `left_m` metres, m/s.
     fn speed_before_m_s(self, left_m: f32) -> f32 {
         let a = self.acceleration_m_s2;
-        // Here the two parts meet, both at the speed a / k.
+        // The two parts meet at this distance, both with the speed a / k.
         let near_m = a / (END_PER_S * END_PER_S);
         if left_m > near_m {
             libm::sqrtf(2.0 * a * (left_m - near_m / 2.0))
@@ -115,7 +113,7 @@ impl Pace {
         }
     }
 
-    /// Returns the distance, m, in which the moving target stops from the speed `speed_m_s`.
+    /// Returns the distance in which the moving target stops from the speed `speed_m_s`, m.
     fn stopping_m(self, speed_m_s: f32) -> f32 {
         let a = self.acceleration_m_s2;
         if speed_m_s > a / END_PER_S {
@@ -127,12 +125,12 @@ impl Pace {
 
     /// Returns the time from a changed setpoint until a drone that flew at maximum speed has stopped.
     ///
-    /// The time is 9.8 s by default. It is the value for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
+    /// It is 9.8 s by default, and the value for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
     ///
     /// The drone reacts after 1.2 s. Then the moving target slows down: first with the deceleration a to the speed a/k,
     /// then in proportion to the remaining distance. Here a is the acceleration of this pace, and k is 0.5 /s, the
     /// ratio of speed to distance near the setpoint. After the returned time the remaining distance is at most 0.25 m.
-    /// At most 8 steps.
+    /// Work: at most 8 steps.
     ///
     /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
     #[expect(
@@ -181,13 +179,12 @@ impl Carrot {
         }
     }
 
-    /// Returns true if the target does not move.
     pub(super) const fn is_standing(&self) -> bool {
         self.is_standing
     }
 
-    /// Returns the position of the moving target at the time `ago` before its last step. The function extrapolates
-    /// backward with the target's velocity.
+    /// Returns the position of the moving target at the time `ago` before its last step. It is extrapolated with the
+    /// target's velocity.
     fn place_before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -198,7 +195,7 @@ impl Carrot {
         }
     }
 
-    /// Returns the position where the moving target stops if it decelerates now, not beyond `setpoint`.
+    /// Returns the position at which the target stops if it decelerates now, but never beyond `setpoint`.
     pub(super) fn stop(&self, setpoint: Placement, pace: Pace) -> Placement {
         let to = self.way_to(setpoint);
         let left = length(to);
@@ -219,8 +216,7 @@ impl Carrot {
         way(self.place, setpoint)
     }
 
-    /// Moves the target toward `setpoint` for the time from its last step until `now`. `drone` is the drone's position
-    /// and the age of this position; `None` if unknown.
+    /// Moves the target toward `setpoint` until `now`. `drone` is the drone's position and its age; `None` if unknown.
     pub(super) fn advance(
         &mut self,
         now: Instant,
@@ -250,7 +246,7 @@ impl Carrot {
             *self = Self::at(setpoint, now);
             return;
         }
-        // A drone ahead of the carrot has no lag to catch up: with a negative lag the carrot would oscillate with the drone.
+        // A drone ahead of the carrot has no lag. With a negative lag the carrot would oscillate with the drone.
         let behind = |(place, ago)| dot(way(place, self.place_before(ago)), to) / left;
         let lag_m = drone.map_or(0.0, behind).max(0.0);
         let most = (CARROT_PART * pace.speed_m_s - CATCH_UP_PER_S * lag_m)
@@ -313,16 +309,17 @@ const STANDING: Duration = Duration::from_millis(200);
 /// repetition makes an ArduCopter wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Number of consecutive reports of another target after which the sent target counts as refused. An ArduCopter
-/// reports its target twice a second.
+/// Number of consecutive reports of another target after which the sent one counts as refused. An ArduCopter reports
+/// its target twice a second.
 const REFUSED_AFTER: u8 = 6;
-/// Age of the autopilot's last report of its target from which its target is unknown, s.
+/// Age of the autopilot's last report of its target at which its target counts as unknown, s.
 const UNKNOWN_AFTER_S: u32 = 10;
 /// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
-/// Maximum difference of a standing target from the target that an ArduCopter reports, 1e-7 degrees. For a moving
-/// target the maximum is [`NEAR_M`] metres plus the path of the target in [`NEAR_S`] seconds.
+/// Maximum difference between a standing target and the target reported by an ArduCopter, 1e-7 degrees.
+///
+/// For a moving target it is [`NEAR_M`] metres plus the target's path in [`NEAR_S`] seconds.
 const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
@@ -335,22 +332,22 @@ const UNCONFIRMED: u8 = 10;
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// Number of times that this target has been sent to the autopilot while it stands still.
+    /// Number of times that this target has been sent while it stands still.
     times_sent: u8,
-    /// True once the autopilot has reported this target as its own.
+    /// True once the autopilot has reported this target.
     is_accepted: bool,
-    /// Time since which targets have been sent without a break.
+    /// Start of the time in which targets have been sent without a break.
     since: Instant,
-    /// Number of consecutive reports in which the autopilot names another target.
+    /// Number of consecutive reports of another target by the autopilot.
     other_targets: u8,
-    /// Time of the last of these reports, s.
+    /// Time of the autopilot's last report of another target, s.
     compared_s: u32,
-    /// True once the autopilot has reported any target position in POSITION_TARGET_GLOBAL_INT.
+    /// True once the autopilot has reported a target position in POSITION_TARGET_GLOBAL_INT.
     is_reported: bool,
 }
 
 impl Target {
-    /// Creates the state of a target standing at `place` that has not been sent to the autopilot yet.
+    /// Creates a target that stands at `place` and has not been sent yet.
     pub(super) const fn at(place: Placement, now: Instant) -> Self {
         Self {
             carrot: Carrot::at(place, now),
@@ -364,19 +361,17 @@ impl Target {
         }
     }
 
-    /// Restarts the schedule of transmissions after the setpoint has changed. The target for the new setpoint is then
-    /// sent at once.
+    /// Restarts the schedule of transmissions for a changed setpoint. The next target is sent at once.
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
         self.times_sent = 0;
         self.is_accepted = false;
     }
 
-    /// Compares the autopilot's reported target with the sent target. Returns true, once, when the two count as
-    /// different: the target has been sent for [`SENT_FOR`], and [`REFUSED_AFTER`] reports in a row named another
-    /// target.
+    /// Compares the autopilot's reported target with the sent target. Returns true once when they count as different:
+    /// the target has been sent for [`SENT_FOR`], and [`REFUSED_AFTER`] reports in a row contained another target.
     ///
-    /// For a moving target a larger difference is allowed, because the report shows an earlier position of the target.
+    /// A larger difference is allowed for a moving target, because the report shows an earlier position of it.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
         self.is_reported = true;
         let Some(point) = axis.point(self.carrot.place) else {
@@ -413,14 +408,14 @@ impl Target {
         before < REFUSED_AFTER && self.is_refused(now)
     }
 
-    /// Returns true while the autopilot reports another target. After some seconds without a report it is unknown.
+    /// Returns true while the autopilot reports another target. False after some seconds without a report.
     pub(super) const fn is_refused(self, now: Instant) -> bool {
         self.other_targets >= REFUSED_AFTER
             && whole_s(now).wrapping_sub(self.compared_s) < UNKNOWN_AFTER_S
     }
 
-    /// Schedules the next target after the drone's own position was sent as the target to a waiting PX4. A PX4
-    /// accepts the mode OFFBOARD only while it receives targets.
+    /// Schedules the next target after the drone's position was sent as the target to a waiting PX4. A PX4 accepts the
+    /// mode OFFBOARD only while it receives targets.
     pub(super) fn on_own_place_sent(&mut self, now: Instant) {
         self.due = now + STANDING;
     }
@@ -445,7 +440,7 @@ impl Target {
     }
 }
 
-/// Converts a time to seconds of 2^20 microseconds.
+/// Converts a time to units of 2^20 µs, about a second.
 #[expect(clippy::cast_possible_truncation, reason = "wraps after a century")]
 const fn whole_s(now: Instant) -> u32 {
     (now.as_micros() >> 20) as u32
@@ -464,7 +459,7 @@ mod tests {
     use crate::place::Placement;
     use crate::time::{Duration, Instant};
 
-    /// Simulates a flight. Returns the positions and speeds of the moving target, every 100 ms, until it stands.
+    /// Simulates a flight. Returns the positions and speeds of the moving target every 100 ms until it stands.
     fn fly(from: Placement, to: Placement, pace: Pace) -> Vec<(Placement, f32), 512> {
         let mut carrot = Carrot::at(from, Instant::ZERO);
         let mut way = Vec::new();
@@ -499,7 +494,7 @@ mod tests {
         }
         let fastest = way.iter().map(|(_, speed)| *speed).fold(0.0, f32::max);
         assert!(fastest > 4.4, "51 m are enough to reach 5 m/s: {fastest}");
-        // 51 m take 5 s up, 3 s down to 2 m/s, and 7 s more from there; 5 s in between.
+        // 51 m take 5 s of acceleration, 5 s at full speed, and 3 s of braking to 2 m/s. The rest takes 7 s.
         assert!((170..210).contains(&way.len()), "{}", way.len());
         let last_moving = way[way.len() - 2].1;
         assert!(last_moving < 0.25, "{last_moving}");
@@ -512,7 +507,7 @@ mod tests {
         let mission = Mission::try_new(paper(3)).unwrap();
         let guard = GuardConfig::of(&mission, mission.config().common);
         assert!(time <= guard.lag);
-        // 158 s from 20 m/s to 0.25 m/s, and 0.5 m left.
+        // 158 s from 20 m/s to 0.25 m/s, with 0.5 m left.
         let slow = Pace {
             speed_m_s: 20.0,
             acceleration_m_s2: 0.125,
@@ -551,8 +546,8 @@ mod tests {
         }
     }
 
-    /// Checks that the moving target stops gently when the setpoint is withdrawn at any moment of a flight. The
-    /// target never stops beyond the setpoint.
+    /// Checks that the moving target stops gently when the setpoint is withdrawn at any time. The target never stops
+    /// beyond the setpoint.
     #[test]
     fn a_withdrawn_carrot_stops_gently_anywhere() {
         let to = Placement::on_line(60.0, 20.0);
@@ -593,7 +588,7 @@ mod tests {
         Axis::between(sites).unwrap()
     }
 
-    /// Returns how often, in 20 s, an autopilot's reports of a moving target count as another target.
+    /// Returns how many reports of a moving target in 20 s count as another target.
     ///
     /// The autopilot reports twice a second. It reports the position that was sent `lag` times 100 ms earlier, moved
     /// sideways by `aside_m`.
@@ -631,7 +626,7 @@ mod tests {
         assert_eq!(other_targets(0, 20.0), 1, "reported once");
     }
 
-    /// Checks that a refusal ends with the autopilot's reports of its target, until the next one.
+    /// Checks that a refusal ends when the autopilot no longer reports its target.
     #[test]
     fn a_refusal_is_unknown_without_reports_of_the_target() {
         let axis = axis();
@@ -645,7 +640,7 @@ mod tests {
                 (second == 8, second == 8)
             );
         }
-        // It refuses a new setpoint, too.
+        // The autopilot refuses a new setpoint, too.
         target.renew(at(9));
         assert!(target.is_refused(at(17)));
         assert!(!target.is_refused(at(20)));
@@ -665,8 +660,8 @@ mod tests {
         );
     }
 
-    /// Checks that the moving target turns smoothly when a new setpoint is in another direction. The velocity in the
-    /// old direction ends within 3 s.
+    /// Checks that the moving target turns smoothly if a new setpoint is in another direction. The velocity in the old
+    /// direction ends within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [
@@ -704,7 +699,7 @@ mod tests {
             }
             assert!(carrot.is_standing(), "({x_m}, {y_m}): {carrot:?}");
             assert_eq!(carrot.place, to);
-            // It stops from 4.8 m/s within 5.8 m.
+            // The target stops from 4.8 m/s within 5.8 m.
             assert!(
                 farthest_m < x_m.max(24.0) + 6.5,
                 "({x_m}, {y_m}): {farthest_m}"

@@ -1,14 +1,15 @@
-//! The operator's command to clear lost relays: COMMAND_LONG 31010, answered by COMMAND_ACK.
+//! Operator's command that reports lost relays as landed: COMMAND_LONG 31010, answered by COMMAND_ACK.
 //!
-//! The guard keeps clear of a silent relay, because its drone may still hover, and only a person can know that it has landed. The
-//! guard clears all relays of one side at once, so a command has to name every lost relay of that side.
+//! The guard keeps clear of a silent relay, because its drone may still hover. Only a person can know that it has
+//! landed. The guard clears all relays of one side at once, so a command must contain the number of every lost relay of
+//! that side.
 //!
 //! | command to this system and component | result |
 //! | --- | --- |
-//! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
+//! | its seven parameters are, apart from zeros, exactly the numbers of the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
 //! | the same command, marked as a repetition | accepted, without an effect |
 //! | any other numbers | denied: [`AutopilotEvent::ClearRefused`] |
-//! | any, while the last one's answer, event or side has not been polled | ignored: an operator's station repeats it |
+//! | any, while the last command's answer, event or side has not been polled | ignored: an operator's station repeats it |
 
 use heapless::Vec;
 
@@ -33,17 +34,17 @@ struct LostSide {
     is_full: bool,
 }
 
-/// Lost relays on both sides, and the operator's command that reports them as landed (clears them).
+/// Lost relays on both sides, and the operator's command that reports them as landed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers. `None` before the
-    /// first such command. If the command is repeated, it is answered a second time and has no other effect.
+    /// Last accepted command: its sender, and the numbers of the landed relays. `None` before the first one. A
+    /// repetition of the command is answered and has no other effect.
     accepted: Option<(Address, RelayNumbers)>,
-    /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without an answer.
+    /// Unsent answer to a command: addressee and `MAV_RESULT`; `None` if there is none.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays the operator has reported as landed; `None` once the relay has been informed.
+    /// Side whose lost relays have landed, until the relay has been informed; otherwise `None`.
     cleared: Option<Side>,
 }
 
@@ -55,7 +56,7 @@ impl Clearance {
         }
     }
 
-    /// Updates the lists of lost relays by an event of the relay.
+    /// Updates the lost relays by an event of the relay.
     pub(super) fn handle_event(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { side, node } | Event::MayLeaveTold { side, node } => {
@@ -71,8 +72,8 @@ impl Clearance {
         }
     }
 
-    /// Processes the operator's command that reports lost relays as landed. Returns the event for the firmware.
-    /// `from` is the command's sender, and `parameters` are the numbers of the relays.
+    /// Processes the operator's command that reports lost relays as landed. Returns the event for the firmware. `from`
+    /// is the sender, and `parameters` are the numbers of the relays.
     pub(super) fn command(
         &mut self,
         from: Address,
@@ -101,25 +102,24 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true while an operator's command that reports landed relays is being processed. The processing ends
-    /// when the command is answered and the relay knows that the lost relays have landed.
+    /// Returns true until a received command is answered and the relay knows which relays have landed.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }
 
-    /// Removes and returns the pending answer to a command, or `None`: its addressee, and its `MAV_RESULT`.
+    /// Removes and returns the pending answer to a command: addressee and `MAV_RESULT`.
     pub(super) const fn take_answer(&mut self) -> Option<(Address, u8)> {
         self.answer.take()
     }
 
-    /// Removes and returns the side whose lost relays have landed, for the relay; `None` if there is none.
+    /// Removes and returns the side whose lost relays have landed; `None` if there is none.
     pub(super) const fn take_cleared(&mut self) -> Option<Side> {
         self.cleared.take()
     }
 }
 
 impl LostSide {
-    /// Returns true if `named` are exactly the lost relays of this side, and this side has a lost relay.
+    /// Returns true if `named` are exactly the lost relays of this side, and there is at least one.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);
@@ -201,11 +201,11 @@ mod tests {
         assert_eq!(event, Some(cleared));
         assert_eq!(clearance.take_answer(), Some((FROM, ACCEPTED)));
         assert_eq!(clearance.take_cleared(), Some(side));
-        // The answer was lost: the repeated command has no further effect.
+        // The answer was lost. The repeated command has no further effect.
         assert_eq!(clearance.command(FROM, named, true), None);
         assert_eq!(clearance.take_answer(), Some((FROM, ACCEPTED)));
         assert_eq!(clearance.take_cleared(), None);
-        // A new command of that kind names no lost relay.
+        // A new command of this kind contains no lost relay.
         let event = clearance.command(FROM, named, false);
         assert!(matches!(event, Some(AutopilotEvent::ClearRefused { .. })));
     }

@@ -32,34 +32,30 @@ use crate::flight::mavlink::signing::Signing;
 /// MAVLink component number of this link: an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
-/// MAVLink system number of this component until the system number of the autopilot is known. The number is the default
-/// of autopilots.
+/// MAVLink system number of this component until the autopilot's number is known. It is the autopilots' default.
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Maximum time between two targets to a PX4 that counts as on time. After a longer time the PX4 has possibly entered
-/// its failsafe.
+/// Maximum time between two targets to a PX4 that counts as on time. Later the PX4 is possibly in its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
-/// Time for which positions must be received regularly before [`State::Blind`] (position lost) ends.
+/// Time of regular positions before the state [`State::Blind`] (position lost) ends.
 const RECOVERY: Duration = Duration::from_millis(1_000);
-/// Time used instead of [`RECOVERY`] if the drone's position is lost twice within [`SHORT_TIME`].
+/// Time used instead of [`RECOVERY`] after two losses of the position within [`SHORT_TIME`].
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
-/// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
+/// Maximum time between two losses of the position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from an ArduCopter's mode change until its report of a fence breach. The fence breach has caused the
-/// mode change.
+/// Maximum time from an ArduCopter's mode change to its report of the geofence breach that caused it.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason not to control the drone must last before it is reported to the operator.
+/// Time for which a reason against control of the drone must last before it is reported.
 const SETTLED: Duration = Duration::from_millis(1_000);
-/// Minimum time between two reports to the operator of reasons not to control the drone.
+/// Minimum time between two reports of reasons against control of the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which the guard must hold the drone back before the reason is reported to the operator. The guard is the
-/// collision avoidance.
+/// Time for which the guard must hold the drone back before the reason is reported to the operator.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
@@ -73,8 +69,7 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     pub(super) axis: Axis,
-    /// Tx and Rx positions with which the link was created. The array is empty in a build without mission uploads
-    /// (feature `upload`).
+    /// Tx and Rx positions with which the link was created. Empty without the feature `upload`.
     loaded: [Sites; UPLOAD as usize],
     pace: Pace,
     clock: MonotonicClock,
@@ -86,41 +81,40 @@ pub struct Autopilot {
     state: State,
     setpoint: Option<Placement>,
     bearing: Option<Bearing>,
-    /// Side of the neighbour that a directional antenna points to; `None` if `point_antenna` has set none.
+    /// Side of the neighbour to which a directional antenna points; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
     target: Option<Target>,
-    /// Position where the moving target stops after the setpoint was withdrawn. `None` while there is a setpoint.
+    /// Position at which the moving target stops after the setpoint was withdrawn. `None` while there is a setpoint.
     stop: Option<Placement>,
-    /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never has.
+    /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never did.
     blind_at: Option<Instant>,
-    /// Time since which positions are received again in the state [`State::Blind`]; `None` otherwise.
+    /// Start of the time in which positions are received again in [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
-    /// Time for which positions must be received regularly before the present state [`State::Blind`] ends.
+    /// Time of regular positions before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Release that has not been reported yet, and the time to report it; `None` if there is none. A release is the end
-    /// of the relay's control of the drone.
+    /// Loss of control over the drone that is still to be reported, and the time of the report. `None` if there is
+    /// none.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and when the reason began. `None` if the pilot
-    /// can give control.
+    /// Reason why the pilot cannot give the relay control of the drone, and its start. `None` if the pilot can.
     wait: (Option<WaitReason>, Instant),
-    /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if
-    /// nothing has been reported. An inner `None` reports that the pilot can give the relay control.
+    /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if nothing
+    /// has been reported. The inner `None` means that the pilot can.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the firmware reports that the relay is ready to control the drone.
     ready: bool,
-    /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
-    /// because of the upstream neighbour, the second because of the downstream neighbour.
+    /// Reported reasons why the guard (collision avoidance) holds the drone back. The first is because of the upstream
+    /// neighbour, the second because of the downstream neighbour.
     hold: [Option<HoldReason>; 2],
-    /// Newest reasons why the guard (collision avoidance) holds the drone back, and when they last changed. The first
-    /// is because of the upstream neighbour, the second because of the downstream neighbour.
+    /// Newest reasons why the guard holds the drone back, and the time of their last change. The order is that of
+    /// `hold`.
     newest_hold: ([Option<HoldReason>; 2], Instant),
-    /// True from the acceptance of a new view (set of relays) until its relays have agreed on positions.
+    /// True from the acceptance of a new view (list of relays) until its relays have agreed on positions.
     is_new_view: bool,
     report: Report,
     position: Option<Position>,
     off_line_detector: OffLineDetector,
     clearance: Clearance,
-    /// Newest noise measurement of a SiK radio, with the drone's position.
+    /// Newest noise measurement of a SiK radio, and the drone's position.
     noise: RadioNoise,
     events: Events,
     sequence: u8,
@@ -131,7 +125,7 @@ impl Autopilot {
     /// Length of the longest frame to send, bytes.
     pub const LONGEST_FRAME: usize = FRAME;
 
-    /// Creates the link to the autopilot of a drone. The drone flies along the line `axis` from Tx to Rx, within the
+    /// Creates the link to a drone's autopilot. The drone flies along the line `axis` from Tx to Rx, with at most the
     /// speed and acceleration of `pace`.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
         Self {
@@ -173,7 +167,7 @@ impl Autopilot {
 
     /// Sets a number that differs at each start of the companion, such as the relay's seed.
     ///
-    /// The number marks this link's clock requests (TIMESYNC). Without the mark, a reply from before a restart of the
+    /// The number marks this link's clock requests (TIMESYNC). Otherwise a reply from before a restart of the
     /// companion, buffered in a cable, could count as a reply to this link. A mode that the pilot chose before the
     /// restart would then count as a new choice.
     pub const fn set_seed(&mut self, seed: u32) {
@@ -203,7 +197,7 @@ impl Autopilot {
         }
     }
 
-    /// Processes an operator's command to this companion, from any sender whose frames are accepted.
+    /// Processes an operator's command to this companion. Any sender whose frames are accepted can send it.
     fn handle_command(&mut self, received: &Received) {
         let Some(Incoming::CommandLong {
             command: CLEAR_LOST,
@@ -268,10 +262,11 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Sets the line from Tx to Rx along which the drone flies, when a mission changes the two positions. Call it when
-    /// `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds its
-    /// position until the next setpoint, because the present one belongs to the previous line. Constant work; a call
-    /// with the present line has no effect.
+    /// Sets the line from Tx to Rx, when a mission changes these positions. Call it when `Relay::sites` has changed,
+    /// before the next [`handle_setpoint`](Self::handle_setpoint).
+    ///
+    /// The drone holds its position until the next setpoint, because the present one belongs to the previous line. A
+    /// call with the present line has no effect. Constant work.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
         let now = self.clock.advance(now);
         if axis == self.axis {
@@ -293,8 +288,8 @@ impl Autopilot {
         }
     }
 
-    /// Sets the position to fly to, from `Relay::setpoint`. With `None`, or a setpoint that is not finite or too far
-    /// from the line Tx to Rx, the drone holds its position.
+    /// Sets the position to fly to, from `Relay::setpoint`. The drone holds its position without a setpoint. It also
+    /// does so at a setpoint that is not finite or too far from the line Tx to Rx.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
         let now = self.clock.advance(now);
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
@@ -316,7 +311,7 @@ impl Autopilot {
         self.bearing = bearing.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
-    /// Sets the side of the neighbour to which a directional antenna points, mounted facing forward.
+    /// Sets the side of the neighbour to which a directional antenna points. The antenna is mounted facing forward.
     ///
     /// With `None` the targets have no heading.
     ///
@@ -328,28 +323,31 @@ impl Autopilot {
 
     /// Sets the time of flight with a full battery, s, and the speeds of return and descent, m/s.
     ///
-    /// Before the first call the three values are NaN, 5 and 1.5. With NaN the battery's percentage gives no remaining time. The speeds are
-    /// clamped to 0.1 to 20. From the first call on, the link requests the battery messages of an ArduCopter.
+    /// Before the first call they are NaN, 5 and 1.5. With a time of NaN the battery's percentage gives no remaining
+    /// time. The speeds are clamped to 0.1 to 20. From the first call on, the link requests the battery messages of an
+    /// ArduCopter.
     pub const fn set_endurance(&mut self, full_s: f32, return_m_s: f32, descent_m_s: f32) {
         let [level, down] = [return_m_s.clamp(0.1, 20.0), descent_m_s.clamp(0.1, 20.0)];
         self.vehicle.battery.setup = Some([full_s, level, down]);
     }
 
-    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`. `None` for
-    /// an unknown number.
+    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`. `None`:
+    /// unknown.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
-    /// Sets whether the relay is ready to control the drone; true at the start. While it is false, a PX4 in
-    /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD. Nothing else changes: a drone that the
-    /// relay controls stays under control, and an ArduCopter accepts GUIDED in any case.
+    /// Records whether the relay is ready to control the drone; initially true. While it is not, a PX4 in
+    /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD.
+    ///
+    /// Nothing else changes: a drone that the relay controls stays under control, and an ArduCopter accepts GUIDED in
+    /// any case.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
         if before != ready && self.state == State::Standby {
-            // Targets are sent anew, if at all, and by a PX4 only after another heartbeat: a PX4 that entered OFFBOARD without
-            // targets is in its failsafe.
+            // Targets start anew, if at all. A PX4 gets them only after another heartbeat, because a PX4 that entered
+            // OFFBOARD without targets is in its failsafe.
             self.target = None;
             if self.vehicle.kind() == Some(Kind::Px4) {
                 self.vehicle.unchoose();
@@ -360,7 +358,7 @@ impl Autopilot {
 
     /// Reports to the operator why the guard (collision avoidance) holds the relay back, for each side.
     ///
-    /// Reasons are sent while the relay controls the drone or in [`State::Standby`], once they have lasted for 3 s.
+    /// A reason is sent while the relay controls the drone or in [`State::Standby`], once it has lasted for 3 s.
     /// Shorter holds are normal while the relays agree on new positions. Equal lines are at least 10 s apart.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
@@ -383,17 +381,16 @@ impl Autopilot {
         }
     }
 
-    /// Queues a text of at most 50 bytes for the operator; returns true if there was room. At most three texts can
+    /// Queues a text of at most 50 bytes for the operator. Returns true if there was room. At most three texts can
     /// wait. Equal texts are sent at least 10 s apart.
     pub fn send_text(&mut self, text: &str) -> bool {
         self.report.queue_text(text)
     }
 
-    /// Processes an event of the relay, and sends events that matter in flight to the operator as text.
+    /// Processes an event of the relay, and sends the operator a text about events that matter in flight.
     ///
-    /// A new view (agreed set of relays) is reported once its positions are agreed, if the relay controls the drone
-    /// and the guard does not hold it back. The reason to hold a drone back is reported by
-    /// [`handle_hold`](Self::handle_hold).
+    /// A new view (list of relays) is such an event once its positions are agreed on. The relay must control the drone
+    /// then, and the guard must not hold it back. [`handle_hold`](Self::handle_hold) reports why a drone is held back.
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {
@@ -469,7 +466,7 @@ impl Autopilot {
         self.report.queue_line(Line::info(Topic::Control, line));
     }
 
-    /// Reports a pending release (end of the relay's control of the drone) once its cause is known.
+    /// Reports that the relay has lost control of the drone, once the cause is known.
     fn review_release(&mut self, now: Instant) {
         let Some((mut release, until)) = self.release else {
             return;
@@ -487,8 +484,8 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Keeps the state [`State::Blind`] (position lost) until positions come regularly for some time. Otherwise the
-    /// state would change with every position of an irregular sequence.
+    /// Keeps the state [`State::Blind`] (position lost) until positions have come regularly for some time. Otherwise
+    /// every position of an irregular sequence would change the state.
     fn recover(&mut self, now: Instant, observed: &mut Observed) {
         if self.state != State::Blind {
             self.located_at = None;
@@ -504,7 +501,7 @@ impl Autopilot {
             .is_some_and(|at| now.since(at) >= self.recovery);
     }
 
-    /// Returns the cause of the relay's latest loss of control, and the autopilot's mode.
+    /// Returns the cause of the last loss of control, and the autopilot's mode.
     fn release(&self) -> Release {
         let vehicle = &self.vehicle;
         let mode = vehicle.mode().unwrap_or(FlightMode::Other);
@@ -520,7 +517,7 @@ impl Autopilot {
         Release { cause, mode }
     }
 
-    /// Returns the reason for which the pilot cannot give the relay control now; `None` if there is none.
+    /// Returns the reason why the pilot cannot give the relay control now; `None` if there is none.
     fn wait_reason(&self, now: Instant) -> Option<WaitReason> {
         let vehicle = &self.vehicle;
         let is_px4 = vehicle.kind() == Some(Kind::Px4);
@@ -541,7 +538,7 @@ impl Autopilot {
         }
     }
 
-    /// Reports the reason for which the relay cannot control the drone, once the reason has lasted for 1 s.
+    /// Reports the reason why the relay cannot control the drone, once it has lasted for 1 s.
     fn review_wait(&mut self, now: Instant) {
         if self.state != State::Standby {
             self.reported_wait = None;
@@ -570,8 +567,8 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the present reason not to control the drone must be reported. `None` once the reason
-    /// has been reported.
+    /// Returns the time at which the present reason against control of the drone must be reported. `None` once it has
+    /// been.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -594,7 +591,7 @@ impl Autopilot {
     pub fn poll_transmit(&mut self, now: Instant) -> Option<FrameBytes> {
         let now = self.clock.advance(now);
         if now == Instant::from_micros(u64::MAX) {
-            // The signing clock stands still there, and frames that are due stay due.
+            // The signing clock does not advance here, and frames that are due stay due.
             return None;
         }
         let frame = self.next_frame(now)?;
@@ -652,7 +649,7 @@ impl Autopilot {
             return None;
         }
         if self.state == State::Standby && kind == Kind::Px4 {
-            // The present position, so that the mode can be entered.
+            // The present position is sent so that the pilot can enter the mode.
             let due = self.target.map_or(now, |target| target.due);
             if due > now {
                 return None;
@@ -684,8 +681,8 @@ impl Autopilot {
         self.target_frame(now, &target.carrot)
     }
 
-    /// Returns the frame that sends the position of `carrot`, the moving target, to the autopilot. `None` if this
-    /// position is too far from the line Tx to Rx.
+    /// Returns the frame that sends the moving target `carrot` to the autopilot. `None` if it is too far from the line
+    /// Tx to Rx.
     fn target_frame(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
         let at: Geodetic = self.axis.point(carrot.place)?;
         let x_m = carrot.place.x_m;
@@ -708,8 +705,8 @@ impl Autopilot {
         message.encode(self.own(), self.peer(), sequence)
     }
 
-    /// Returns the MAVLink address of this component. The address has the autopilot's system number, because this
-    /// component is a part of the vehicle.
+    /// Returns the MAVLink address of this component. It has the autopilot's system number, because this component is a
+    /// part of the vehicle.
     fn own(&self) -> Address {
         Address {
             component: COMPONENT,
@@ -728,31 +725,33 @@ impl Autopilot {
         millis(now.since(self.began).as_micros())
     }
 
-    /// Returns the newest measured position of the drone, with its time, for `Relay::handle_position`. `None` if
-    /// there is no new position since the last call.
+    /// Returns the drone's newest measured position and its time, for `Relay::handle_position`. `None` if there is no
+    /// new one since the last call.
     pub fn poll_position(&mut self) -> Option<Position> {
         let position = self.position.take()?;
         let at = self.clock.external(position.at);
         Some(Position { at, ..position })
     }
 
-    /// Returns the position of a drone too far from the line Tx to Rx, and its distance from that line. Such a drone
-    /// has no position in the mission's coordinates. `None` if the drone is near the line, or if its last position is
-    /// older than 3 s. Constant work.
+    /// Returns the position of a drone too far from the line Tx to Rx, and its distance from it. Such a drone has no
+    /// position in the mission's coordinates.
+    ///
+    /// `None` if the drone is near the line, or if its last position is older than 3 s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
         let at = self.off_line_detector.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)
     }
 
-    /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. The caller gives them to
-    /// `Relay::handle_sample`. The result is the newest measurement that was taken in the air. `None` if there is no
-    /// new measurement since the last call, or without the feature `sensing`.
+    /// Returns the newest noise measured in the air by a SiK radio, and the drone's position.
+    ///
+    /// The noise is from RADIO_STATUS. The caller passes both to `Relay::handle_sample`. `None` if there is no new
+    /// measurement since the last call, or without the feature `sensing`.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.noise.take()
     }
 
-    /// Returns the side whose lost relays have landed by the operator's report, for `Relay::clear_lost`. `None` if
-    /// there is no new report since the last call.
+    /// Returns the side whose lost relays the operator has reported as landed, for `Relay::clear_lost`. `None` if there
+    /// is no new report since the last call.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
         self.clearance.take_cleared()
     }
@@ -767,7 +766,7 @@ impl Autopilot {
         self.events.take().or_else(mistrusted)
     }
 
-    /// Returns the time at which [`handle_timeout`](Self::handle_timeout) must be called at the latest.
+    /// Returns the time by which [`handle_timeout`](Self::handle_timeout) must be called.
     pub fn poll_timeout(&self, now: Instant) -> Instant {
         let now = self.clock.internal(now);
         let target = self.target.map(|target| target.due);
@@ -801,13 +800,13 @@ impl Autopilot {
         self.state == State::Grounded && self.vehicle.is_landed(self.clock.internal(now))
     }
 
-    /// Returns the counts of intact and broken messages from the autopilot.
+    /// Returns the numbers of intact and corrupted messages from the autopilot.
     pub const fn counters(&self) -> Counters {
         self.parser.counters()
     }
 
-    /// Signs all frames with the key of `signing`, and accepts only frames that are signed with it. An exception is
-    /// RADIO_STATUS of a radio, which cannot sign. A ground station sets the autopilot's key (SETUP_SIGNING).
+    /// Signs all frames with the key of `signing`, and accepts only frames signed with it. Only RADIO_STATUS of a
+    /// radio, which cannot sign, is accepted unsigned. A ground station sets the autopilot's key (SETUP_SIGNING).
     #[cfg(feature = "mavlink-signing")]
     pub const fn sign(&mut self, signing: Signing) {
         self.trust.sign_with(signing);
@@ -820,34 +819,35 @@ impl Autopilot {
 }
 
 impl Autopilot {
-    /// Exchanges data with the relay of the same drone, and handles the link's timeouts. Data go in both directions.
+    /// Exchanges data with the relay of the same drone in both directions, and handles the link's timeouts.
     ///
     /// In this documentation the *link* is this object, the link to the autopilot. A call takes five steps:
     ///
     /// | step | from | to | data | why at this point |
     /// | --- | --- | --- | --- | --- |
-    /// | 1 | relay | link | line between the Tx and Rx positions of an adopted mission | the positions and the setpoint of later steps are along it |
+    /// | 1 | relay | link | line between the Tx and Rx positions of an adopted mission | positions and setpoint of later steps refer to it |
     /// | 2 | | link | timeouts that are due by `now` | an overdue link releases the drone |
     /// | 3 | link | relay | control state | an engaged relay starts from the first position that it receives afterwards |
-    /// | 4 | link | relay | position, sample of the radio's noise, endurance, side with cleared lost relays | the relay computes its setpoint from them |
+    /// | 4 | link | relay | position, sample of the radio's noise, endurance, side whose lost relays have landed | the relay computes its setpoint from them |
     /// | 5 | relay | link | readiness, hold reasons, end of the endurance, setpoint, values for the operator | the link sends the newest ones |
     ///
     /// Call it in each turn of the main loop, after [`handle_bytes`](Self::handle_bytes) and before
-    /// [`poll_transmit`](Self::poll_transmit). If the relay's ports are served after this call, the relay sends the new position in the
-    /// same turn. A loop may call it a second time after the ports were served: the link then sends a new setpoint in the same turn. A
-    /// call without new data has no effect.
+    /// [`poll_transmit`](Self::poll_transmit). If the relay's ports are served after this call, the relay sends the new
+    /// position in the same turn. A loop may call it a second time after that. The link then sends a new setpoint in
+    /// the same turn. A call without new data has no effect.
     ///
-    /// Returns a flag and a position. The flag is true if the relay received new data from the link. Then the relay's frames, its events
-    /// and its next timeout may have changed. The position is the drone's position if the link passed a new position to the relay, else
-    /// `None`. A loop that serves the relay's ports after each call can ignore both results.
+    /// Returns a flag and a position. The flag is true if the relay received new data from the link. Then the relay's
+    /// frames, its events and its next timeout may have changed. The position is the drone's position if the link
+    /// passed a new one to the relay; otherwise `None`. A loop that serves the relay's ports after each call can ignore
+    /// both results.
     ///
-    /// Some calls remain for the caller. It passes events of the relay to [`handle_event`](Self::handle_event), because
-    /// [`Relay::poll_event`] returns each event once. For an antenna that [`point_antenna`](Self::point_antenna) does not set, it passes
-    /// the bearing to [`handle_bearing`](Self::handle_bearing). The line from Tx to Rx is at first the line given to [`new`](Self::new).
-    /// An exchange replaces a line that [`fly_along`](Self::fly_along) has set.
+    /// The caller still passes events of the relay to [`handle_event`](Self::handle_event), because
+    /// [`Relay::poll_event`] returns each event once. For an antenna that [`point_antenna`](Self::point_antenna) does
+    /// not set, it passes the bearing to [`handle_bearing`](Self::handle_bearing). The line from Tx to Rx is at first
+    /// the line given to [`new`](Self::new). An exchange replaces a line that [`fly_along`](Self::fly_along) has set.
     ///
-    /// Constant work: one call of each input of the relay and of the link. Also a new [`Axis`](crate::flight::axis::Axis) when the
-    /// positions of Tx and Rx have changed.
+    /// Constant work: one call of each input of the relay and of the link. When the positions of Tx and Rx have
+    /// changed, also a new [`Axis`](crate::flight::axis::Axis).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -931,7 +931,7 @@ impl Autopilot {
         (is_news, position)
     }
 
-    /// Replaces this link's line from Tx to Rx by the line of the relay's mission, if the two lines differ.
+    /// Replaces this link's line from Tx to Rx by that of the relay's mission, if they differ.
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();

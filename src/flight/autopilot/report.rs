@@ -1,7 +1,8 @@
 //! Texts and numbers for the operator, shown by a ground station, and events for the firmware.
 //!
-//! Equal lines are sent at most once per [`SPACING`], critical ones per [`URGENT`], and within it at most [`RECENT`] different lines. A waiting line is replaced
-//! by a newer line of the same [`Topic`], so the last line on a topic is always current.
+//! Equal lines are sent at most once per [`SPACING`], critical ones once per [`URGENT`]. Within [`SPACING`] at most
+//! [`RECENT`] different lines are sent. A newer line of the same [`Topic`] replaces a waiting line, so the last line on
+//! a topic is always current.
 
 use heapless::{Deque, String, Vec};
 
@@ -16,39 +17,39 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Minimum time between two equal lines of text to the operator, ms.
+/// Minimum time between two equal lines to the operator, ms.
 const SPACING: u32 = 10_000;
 
 /// Minimum time between two equal lines that require action now, ms.
 const URGENT: u32 = 5_000;
 
-/// Maximum number of different lines of text to the operator that are sent within [`SPACING`].
+/// Maximum number of different lines to the operator within [`SPACING`].
 const RECENT: usize = 16;
 
-/// Maximum number of queued text lines to the operator that this link itself has written.
+/// Maximum number of queued lines written by this link.
 const LINES: usize = 6;
-/// Maximum number of queued text lines to the operator that the firmware has written.
+/// Maximum number of queued texts written by the firmware.
 const TEXTS: usize = 3;
 
-/// Interval at which the numbers (SIR and position) are sent to the operator.
+/// Interval between two transmissions of the numbers (SIR and position) to the operator.
 const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 
-/// Topic of a line of text to the operator. If a line has to wait, a newer line of the same topic replaces it.
+/// Topic of a line to the operator. A newer line replaces a waiting line of the same topic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
     /// Event about the control of the drone: the relay takes or loses control.
     Control,
-    /// Reason for which the pilot cannot give the relay control of the drone.
+    /// Reason why the pilot cannot give the relay control of the drone.
     Wait,
-    /// Reason why the guard (collision avoidance) holds the drone back because of its upstream neighbour.
+    /// Reason why the guard holds the drone back because of the upstream neighbour.
     Upstream,
-    /// Reason why the guard (collision avoidance) holds the drone back because of its downstream neighbour.
+    /// Reason why the guard holds the drone back because of the downstream neighbour.
     Downstream,
-    /// Event of the relay itself that the operator is to see, such as a lost neighbour.
+    /// Event of the relay that the operator must see, such as a lost neighbour.
     Relay,
-    /// Breach of the autopilot's own fence.
+    /// Breach of the autopilot's geofence.
     Fence,
     /// Command of the operator that reports lost relays as landed.
     Clearance,
@@ -60,7 +61,7 @@ impl Topic {
     const COUNT: usize = 8;
 }
 
-/// Line of text for the operator. The text is stored in two parts, which are joined when it is sent.
+/// Line of text for the operator, in two parts that are joined when it is sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Line {
     topic: Topic,
@@ -95,9 +96,9 @@ impl Line {
         }
     }
 
-    /// Returns the text for the guard's (collision avoidance) reason to hold the drone back on `side`.
+    /// Returns the text for the reason why the guard (collision avoidance) holds the drone back on `side`.
     ///
-    /// `None` says that the reason has ended.
+    /// `None` means that the reason has ended.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
             Side::Upstream => (Topic::Upstream, " the previous drone"),
@@ -158,15 +159,14 @@ fn left(now: Instant, until: u32) -> Option<Duration> {
         .then(|| Duration::from_millis(left.into()))
 }
 
-/// Queue of the texts and named values that the link is to send to the operator.
+/// Queue of the texts and named values for the operator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
-    /// Hashes of the lines sent in the last 10 s. Each hash has the earliest time at which an equal line is allowed, in
-    /// wrapping ms.
+    /// Hashes of the lines sent in the last 10 s. Each has the earliest time of an equal line, in wrapping ms.
     recent: Vec<(u32, u32), RECENT>,
-    /// Hash of the last line sent on each topic, 0 before the first line. An equal line that would have to wait is
+    /// Hash of the last line sent on each topic; 0 before the first line. An equal line that would have to wait is
     /// dropped.
     newest_sent: [u32; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
@@ -185,7 +185,7 @@ impl Report {
         if self.lines.is_full() {
             self.lines.remove(0);
         }
-        // The queue has room for it.
+        // The queue has room for the line.
         let _ = self.lines.push(line);
     }
 
@@ -200,15 +200,15 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash can be sent at `now`, and marks it as sent. A line must not be sent within
-    /// `spacing` ms after an equal line.
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. This requires `spacing` ms
+    /// since the last equal line.
     fn passes(&mut self, now: Instant, hash: u32, spacing: u32) -> bool {
         self.recent.retain(|(_, until)| left(now, *until).is_some());
         let until = millis(now.as_micros()).wrapping_add(spacing);
         self.recent.iter().all(|(of, _)| *of != hash) && self.recent.push((hash, until)).is_ok()
     }
 
-    /// Removes the line at index `at`; unlike `Vec::remove`, it does not panic if there is no such line.
+    /// Removes the line at index `at`. Unlike `Vec::remove` it does not panic without such a line.
     fn remove_line(&mut self, at: usize) {
         let mut index = 0;
         self.lines.retain(|_| {
@@ -250,13 +250,13 @@ impl Report {
             if self.passes(now, hash([&text, ""]), SPACING) {
                 return Some((severity::INFO, text));
             }
-            // The queue has room for it.
+            // The queue has room for the text.
             let _ = self.texts.push_back(text);
         }
         None
     }
 
-    /// Sets the numbers to send to the operator: the SIR, dB, and the relay's position. `None` for an unknown number.
+    /// Sets the numbers to send to the operator: SIR, dB, and position of the relay. `None`: unknown.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -309,77 +309,81 @@ impl Report {
     }
 }
 
-/// Maximum number of lost relays that one command of the operator can report as landed.
+/// Maximum number of lost relays in one command of the operator.
 pub(super) const MOST: usize = 7;
 
-/// Numbers of the relays that a command names; unused entries are 0.
+/// Numbers of the relays in a command; unused entries are 0.
 pub(super) type RelayNumbers = [u16; MOST];
 
 /// Event of the link to an autopilot, for the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum AutopilotEvent {
-    /// The first message of an autopilot of this kind has arrived.
+    /// First message of an autopilot of this kind.
     Found(Kind),
     /// The autopilot has restarted.
     Restarted,
-    /// New control state of the drone: see [`State`].
+    /// Change of the control state of the drone: see [`State`].
     State(State),
-    /// Release: the relay no longer controls the drone. The event comes together with [`State::Standby`], or up to 1.3 s later if the cause
-    /// is possibly a fence.
+    /// The relay has lost control of the drone. Comes together with [`State::Standby`], or up to 1.3 s later if the
+    /// cause is possibly a geofence.
     Released(Release),
-    /// The relay cannot control the drone now, for this reason. The pilot cannot give the relay control by OFFBOARD or
-    /// GUIDED, or the relay does not use the mode that the pilot has chosen.
-    Waits(WaitReason),
-    /// The pilot can now give the relay control of the drone, by the mode OFFBOARD or GUIDED.
-    Ready,
-    /// The autopilot refuses the target: for 3 s it has reported another target than the sent one.
+    /// Reason why the relay cannot control the drone now.
     ///
-    /// The sent position is outside the autopilot's own fence, or another companion sends targets to the same autopilot.
+    /// The pilot cannot give the relay control by OFFBOARD or GUIDED, or the relay does not use the mode that the pilot
+    /// has chosen.
+    Waits(WaitReason),
+    /// The pilot can now give the relay control of the drone by OFFBOARD or GUIDED.
+    Ready,
+    /// The autopilot refuses the target: for 3 s it has reported a target other than the sent one.
+    ///
+    /// The sent position is outside the autopilot's geofence, or another companion sends targets to the same autopilot.
     Refused,
-    /// Report of the autopilot that the drone is outside of the autopilot's fence.
+    /// The autopilot reports that the drone is outside of the autopilot's geofence.
     FenceBreached,
-    /// Drone so far from the line Tx to Rx that it has no position in the mission's coordinates. Check that the
-    /// configured positions of Tx and Rx belong to this flight. This event is reported once on the ground and at most
+    /// The drone is so far from the line Tx to Rx that it has no position in the mission's coordinates.
+    ///
+    /// Check that the configured positions of Tx and Rx belong to this flight. Reported once on the ground, and at most
     /// once in 10 s in the air.
     OffLine(OffLine),
-    /// The link accepted an operator's command that reports the lost relays of one side as landed. The command came over MAVLink.
-    /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
+    /// The link accepted an operator's command that reports the lost relays of one side as landed.
+    ///
+    /// The command came over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for
+    /// the relay.
     LostCleared {
         /// Side of this relay whose lost relays have landed.
         side: Side,
         /// Node numbers of the relays that have landed, padded with zeros.
         relays: [u16; MOST],
-        /// MAVLink address of the sender of the command.
+        /// MAVLink address of the command's sender.
         from: Address,
     },
-    /// The link denied an operator's command that reports lost relays as landed. The reason: the command does not name exactly all lost
-    /// relays of one side.
+    /// The link denied an operator's command that reports lost relays as landed.
+    ///
+    /// Its numbers are not exactly those of all lost relays of one side.
     ClearRefused {
-        /// Numbers of the relays that the command names, padded with zeros.
+        /// Numbers of the relays in the command, padded with zeros.
         relays: [u16; MOST],
-        /// MAVLink address of the sender of the command.
+        /// MAVLink address of the command's sender.
         from: Address,
     },
-    /// Mismatch of the signatures of autopilot and link.
+    /// The signatures of autopilot and link do not match.
     Mistrusted(Mistrust),
 }
 
-/// Events of the link that the firmware has not polled yet.
+/// Events that the firmware has not polled yet.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Events {
     pub(super) found: Option<Kind>,
     pub(super) restarted: bool,
     pub(super) released: Option<Release>,
     pub(super) state: Option<State>,
-    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], the newer one of the two. `None` if none is
-    /// pending.
+    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], the newer of the two. `None` if none is pending.
     pub(super) waits: Option<AutopilotEvent>,
     pub(super) breached: bool,
     pub(super) refused: bool,
     pub(super) off_line: Option<OffLine>,
-    /// Pending result of a command: [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`]. `None` if none
-    /// is pending.
+    /// Pending [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`]. `None` if none is pending.
     pub(super) clearance: Option<AutopilotEvent>,
 }
 
@@ -446,7 +450,7 @@ mod tests {
             let said = texts(&mut report, at(200 * i));
             assert_eq!(said.is_empty(), i >= 2, "{i}: {said:?}");
         }
-        // The last one was `off`, as was the last that an operator read: nothing is left to say.
+        // The last line was `off`, and it was also the last one that the operator has read. So no line is sent.
         assert_eq!(texts(&mut report, at(30_000)).len(), 0);
         report.queue_line(ON);
         assert_eq!(texts(&mut report, at(31_000)).as_slice(), ["on"]);

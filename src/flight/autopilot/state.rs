@@ -1,12 +1,12 @@
-//! States of the link to an autopilot.
+//! Control states of the link to an autopilot.
 //!
 //! | state | messages sent | next state |
 //! | --- | --- | --- |
 //! | `Silent` | HEARTBEAT | autopilot received: `Grounded` |
 //! | `Grounded` | also requests for messages, TIMESYNC | nothing received for 3 s: `Silent`; armed and in the air: `Standby` |
-//! | `Standby` | also, to a PX4 once a mode was chosen and the relay is ready, the present position as a target | nothing received: `Silent`; on the ground or disarmed: `Grounded`; mode granted after a mode was chosen, position known: `Engaged` |
+//! | `Standby` | also the present position as a target, to a PX4 once a mode was chosen and the relay is ready | nothing received: `Silent`; on the ground or disarmed: `Grounded`; mode granted after a mode was chosen, position known: `Engaged` |
 //! | `Engaged` | also the target, on its way to the setpoint | nothing received: `Silent`; on the ground or disarmed: `Grounded`; another mode, or the choice was cleared: `Standby`; no position for 1 s, or the link of an ArduCopter late: `Blind` |
-//! | `Blind` | also the last target, frozen | as `Engaged`; position known for 1 s, or for 10 s if it was blind in the last minute: `Engaged`, from the drone's own position |
+//! | `Blind` | also the last target, which stands still | as `Engaged`; position known for 1 s, or for 10 s if it was blind in the last minute: `Engaged`, from the drone's position |
 //!
 //! *A mode was chosen* is an observation of this link. It is not stored across restarts:
 //!
@@ -15,11 +15,12 @@
 //! | PX4 | other than OFFBOARD, `system_status` ACTIVE (4) | start, restart, disarming; `system_status` CRITICAL (5) or above; nothing received for 0.8 s; no echo of the last 1.5 s; a position that arrives 1 s late; a target that is sent 0.6 s late |
 //! | ArduCopter | other than GUIDED, not CRITICAL | start, restart, disarming; no heartbeat for 3 s |
 //!
-//! A link that finds OFFBOARD or GUIDED granted therefore engages nothing and sends no targets. The pilot has to choose another
-//! mode first, and receives that as the reason. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
-//! and no message of a neighbour.
+//! So a link that finds OFFBOARD or GUIDED granted at its start takes no control and sends no targets. The pilot must
+//! choose another mode first, and the operator is informed of this. Only the pilot's choice of a mode ends a PX4's
+//! failsafe. Nothing else changes a state: no setpoint, and no message of a neighbour.
 
-/// Control state of the drone. It says whether the relay controls the drone, and which targets the autopilot gets.
+/// Control state of the drone. It shows whether the relay controls the drone, and determines which targets the
+/// autopilot gets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum State {
     /// No autopilot is received on the link.
@@ -31,11 +32,11 @@ pub enum State {
     Standby,
     /// The relay controls the drone, which flies to the relay's setpoint.
     Engaged,
-    /// The relay controls the drone, whose position is unknown: the autopilot keeps the last target.
+    /// The relay controls the drone, but its position is unknown: the autopilot keeps the last target.
     Blind,
 }
 
-/// Observations of the autopilot that determine the control state.
+/// Observations that determine the control state.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "what is seen of an autopilot, each for itself"
@@ -46,8 +47,7 @@ pub(super) struct Observed {
     pub(super) is_received: bool,
     /// True if the drone is armed and in the air.
     pub(super) flying: bool,
-    /// True if the pilot has chosen the mode OFFBOARD or GUIDED since this link started. In this mode the relay sets
-    /// the target.
+    /// True if the pilot has chosen OFFBOARD or GUIDED since this link started. In this mode the relay sets the target.
     pub(super) granted: bool,
     /// True if the drone's position is known.
     pub(super) located: bool,
@@ -65,7 +65,7 @@ impl State {
         match self {
             _ if !there => Self::Silent,
             _ if !flying => Self::Grounded,
-            // One transition per call: each state sends its messages before the next one.
+            // One transition per call, so that each state sends its messages before the next one.
             Self::Silent => Self::Grounded,
             Self::Grounded => Self::Standby,
             _ if !granted => Self::Standby,
@@ -81,15 +81,16 @@ impl State {
     }
 }
 
-/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. With other vehicles the same mode numbers have other meanings.
+/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. Other vehicles use the same mode numbers for other
+/// modes.
 const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 
 /// Kind of autopilot firmware: PX4 or ArduPilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// PX4: the mode OFFBOARD grants control, for as long as targets are streamed.
+    /// PX4: the mode OFFBOARD gives control for as long as targets are sent.
     Px4,
-    /// ArduCopter: the mode GUIDED grants control, and a target holds until the next one.
+    /// ArduCopter: the mode GUIDED gives control, and a target stays valid until the next one.
     ArduCopter,
 }
 
@@ -149,7 +150,7 @@ impl FlightMode {
     }
 }
 
-/// Reason for which the relay no longer controls the drone.
+/// Reason why the relay no longer controls the drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum ReleaseCause {
@@ -157,24 +158,24 @@ pub enum ReleaseCause {
     Chosen,
     /// The autopilot entered its failsafe.
     Failsafe,
-    /// The autopilot's fence was breached.
+    /// The drone left the autopilot's geofence.
     Fence,
-    /// The link to the autopilot was interrupted or late. A PX4 is then possibly in its failsafe. A stream of targets
-    /// would end this failsafe.
+    /// The link to the autopilot was interrupted or late. A PX4 is then possibly in its failsafe, which targets would
+    /// end.
     Link,
 }
 
-/// Release of the drone's control: its cause, and the present mode of the autopilot.
+/// Loss of control over the drone: its cause, and the mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Release {
-    /// Event or decision because of which the relay has lost control of the drone.
+    /// Reason why the relay has lost control of the drone.
     pub cause: ReleaseCause,
-    /// Flight mode of the autopilot at the time when the relay lost control of the drone.
+    /// Flight mode of the autopilot when the relay lost control.
     pub mode: FlightMode,
 }
 
 impl Release {
-    /// Returns the text about the release for the operator, in two parts.
+    /// Returns the text for the operator about the loss of control, in two parts.
     pub(super) const fn text(self) -> [&'static str; 2] {
         let mode = match self.mode {
             FlightMode::Companion => "relay: released",
@@ -195,12 +196,12 @@ impl Release {
     }
 }
 
-/// Reason for which the relay cannot control the drone now. The pilot cannot give the relay control, or the relay does
-/// not use the mode OFFBOARD or GUIDED that the pilot has chosen.
+/// Reason why the relay cannot control the drone now. Either the pilot cannot give it control, or it does not use the
+/// mode OFFBOARD or GUIDED that the pilot has chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {
-    /// The autopilot is in its failsafe. The failsafe ends when the pilot chooses a mode.
+    /// The autopilot is in its failsafe, which ends when the pilot chooses a mode.
     Failsafe,
     /// The link from the autopilot is late: its messages are old on arrival.
     Link,
@@ -215,7 +216,7 @@ pub enum WaitReason {
 }
 
 impl WaitReason {
-    /// Returns the text that tells the operator this reason for losing control of the drone.
+    /// Returns the text for the operator about this reason.
     pub(super) const fn text(self) -> &'static str {
         match self {
             Self::Failsafe => "relay: waits, autopilot in failsafe",

@@ -1,38 +1,39 @@
-//! Requests for messages of the autopilot (SET_MESSAGE_INTERVAL). A request is repeated when the message arrives too seldom, since
-//! another ground station may have changed its rate. Messages that the autopilot has denied, or that never arrive, are not
-//! requested any more.
+//! Requests for messages of the autopilot (SET_MESSAGE_INTERVAL).
 //!
-//! One request is outstanding at a time: an answer (COMMAND_ACK) does not name the message, so it belongs to that request.
+//! A request is repeated if the message arrives too seldom, because another ground station may have changed its rate.
+//! Messages that the autopilot has denied, or that never arrive, are no longer requested.
+//!
+//! One request is outstanding at a time. An answer (COMMAND_ACK) does not contain the message's id, so it belongs to
+//! that request.
 
 use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time window in which the autopilot's messages are counted. Messages that come too rarely are then requested once
-/// more.
+/// Time in which received messages are counted. A message that comes too seldom is then requested again.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
 /// Maximum time from a request for a message to its answer.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Number of [`WINDOW`]s without a message after which this message is no longer requested. A message without which the
-/// drone cannot fly is requested every [`SELDOM`] windows instead.
+/// Number of [`WINDOW`]s without a message after which it is no longer requested.
+///
+/// A message without which the drone cannot fly is requested every [`SELDOM`] windows instead.
 const MAX_SILENT_WINDOWS: u8 = 4;
-/// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.
+/// Number of [`WINDOW`]s between two requests for a vital message that does not arrive.
 const SELDOM: u8 = 16;
 
-/// Number of unanswered requests after which the autopilot seems unable to receive the link's frames.
+/// Number of unanswered requests after which the autopilot is assumed not to receive the link's frames.
 const UNANSWERED: u8 = 2;
 
-/// Values of `MAV_RESULT` with which the autopilot denies a request for good.
+/// Values of `MAV_RESULT` by which the autopilot denies a request for good.
 const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 
-/// Message that the link requests from the autopilot, and its interval.
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// True for a message without which the drone cannot be controlled. The other requested messages (fence, target)
-    /// are not sent by every autopilot.
+    /// True if the drone cannot be controlled without the message. Not every autopilot sends the other messages
+    /// (geofence, target).
     is_vital: bool,
 }
 
@@ -59,12 +60,12 @@ const REQUESTED: [RequestedMessage; 6] = [
     RequestedMessage::new(id::HOME_POSITION, 2_000, false),
 ];
 
-/// State of the periodic request for one kind of message from the autopilot.
+/// State of the request for one message.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     is_requested: bool,
     messages: u32,
-    /// Number of consecutive time windows in which this message was not received although it was requested.
+    /// Number of consecutive windows in which the requested message was not received.
     silent_windows: u8,
     is_denied: bool,
 }
@@ -74,7 +75,7 @@ struct Stream {
 pub(super) struct Streams {
     all: [Stream; REQUESTED.len()],
     since: Instant,
-    /// Outstanding request: index of the requested message, and time of the request. `None` if there is none.
+    /// Outstanding request: index of the message, and time of the request. `None` if there is none.
     outstanding: Option<(usize, Instant)>,
     unanswered: u8,
     is_answered: bool,
@@ -97,7 +98,7 @@ impl Streams {
         }
     }
 
-    /// Counts a message received from the autopilot, if its MAVLink id `id` is one of the requested ones.
+    /// Counts a received message if its MAVLink id `id` is one of the requested ones.
     pub(super) fn count_message(&mut self, id: u32) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             if asked.id == id {
@@ -106,7 +107,7 @@ impl Streams {
         }
     }
 
-    /// Processes the autopilot's answer to the outstanding request; `result` is its `MAV_RESULT`.
+    /// Processes the answer to the outstanding request. `result` is its `MAV_RESULT`.
     pub(super) fn answer(&mut self, result: u8) {
         self.is_answered = true;
         if let Some((which, _)) = self.outstanding.take()
@@ -117,7 +118,7 @@ impl Streams {
         }
     }
 
-    /// Returns true if the autopilot answers requests, false if it does not; `None` while that is unknown.
+    /// Returns true if the autopilot answers requests, and false if it does not. `None` if unknown.
     pub(super) const fn answers_requests(&self) -> Option<bool> {
         if self.is_answered {
             Some(true)
@@ -135,7 +136,8 @@ impl Streams {
             return;
         }
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
-            // Twice as many and one more would have been due. A division would need a proof that no interval is 0.
+            // At the full rate twice as many messages and one more would have arrived. A division would need a proof
+            // that no interval is 0.
             let more = 2 * u64::from(stream.messages) + 1;
             let is_seldom = more * asked.interval.as_micros() <= passed.as_micros();
             stream.silent_windows = if stream.messages > 0 {
@@ -154,7 +156,7 @@ impl Streams {
 
     /// Restarts the requests for the autopilot's report of its target, once the relay controls the drone.
     ///
-    /// An ArduCopter sends that report only in GUIDED. Earlier requests were therefore possibly given up.
+    /// An ArduCopter sends that report only in GUIDED, so earlier requests were possibly given up.
     pub(super) fn renew(&mut self) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;

@@ -1,8 +1,8 @@
-//! Signature policy of the link. Without a key it accepts every frame, with a key only frames signed with it.
+//! Signature policy of the link. Without a key all frames are accepted, with a key only those signed with it.
 //!
-//! A link with a key signs its frames and accepts frames that are signed with the key and are new, and unsigned RADIO_STATUS: a SiK
-//! radio cannot sign. An autopilot with a key ignores unsigned frames silently, so an event reports each kind of mismatch to the
-//! firmware, once. A mismatch is reported after three consecutive heartbeats of an autopilot.
+//! A link with a key signs its frames and accepts frames that are new and signed with the key. It also accepts unsigned
+//! RADIO_STATUS, because a SiK radio cannot sign. An autopilot with a key ignores unsigned frames silently. So an event
+//! reports each kind of mismatch to the firmware once, after three consecutive heartbeats of an autopilot.
 
 use super::state::Kind;
 use super::vehicle::AUTOPILOT;
@@ -18,23 +18,23 @@ const IN_A_ROW: u8 = 3;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Mistrust {
-    /// The autopilot signs, the link has no key, and the autopilot answers no request. The autopilot seems to ignore
-    /// unsigned frames.
+    /// The autopilot signs, the link has no key, and the autopilot answers no request. It seems to ignore unsigned
+    /// frames.
     NoKey,
     /// The autopilot signs and the link has no key, but the autopilot answers unsigned requests.
     SignsOnly,
-    /// The link has a key, and the autopilot does not sign. Its frames are therefore ignored.
+    /// The link has a key, and the autopilot does not sign, so its frames are ignored.
     Unsigned,
     /// The autopilot and the link sign with different keys.
     OtherKey,
-    /// The autopilot's signed frames are old: its clock has gone back, or a recording is replayed.
+    /// The autopilot's signed frames are old. Its clock has gone back, or a recording is replayed.
     Old,
 }
 
 impl Mistrust {
     const ALL: [Self; 4] = [Self::NoKey, Self::Unsigned, Self::OtherKey, Self::Old];
 
-    /// Returns the bit of this kind of signature mismatch, for sets of kinds.
+    /// Returns the bit of this kind of mismatch, for sets of kinds.
     const fn bit(self) -> u8 {
         1 << self as u8
     }
@@ -50,17 +50,17 @@ impl From<Flaw> for Mistrust {
     }
 }
 
-/// Signing key of the link, and the signature mismatches found.
+/// Signing key of the link, and the signature mismatches of the autopilot.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trust {
     signing: Option<Signing>,
     refused: u32,
-    /// Signature mismatch of the latest heartbeats, and the number of heartbeats in a row with it. `None` if the last
-    /// heartbeat had no mismatch.
+    /// Signature mismatch of the last heartbeats, and their number in a row. `None` if the last heartbeat had no
+    /// mismatch.
     row: Option<(Mistrust, u8)>,
-    /// Kinds of signature mismatch that have to be reported, as bits.
+    /// Bit mask of the kinds of mismatch that must be reported.
     due: u8,
-    /// Kinds of signature mismatch found since the start, as bits. Each kind is reported once.
+    /// Bit mask of the kinds of mismatch found since the start. Each is reported once.
     found: u8,
 }
 
@@ -133,8 +133,8 @@ impl Trust {
         }
     }
 
-    /// Returns the next signature mismatch to report; each kind is returned once. `hears` is true if the autopilot
-    /// answers requests, false if it does not, and `None` while that is unknown.
+    /// Returns the next signature mismatch to report. Each kind is returned once. `hears` is true if the autopilot
+    /// answers requests, false if it does not, and `None` if unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL
@@ -152,7 +152,6 @@ fn no_key(received: &Received) -> Option<Mistrust> {
     received.is_signed.then_some(Mistrust::NoKey)
 }
 
-/// Returns true for a heartbeat of an autopilot.
 fn is_heartbeat(received: &Received) -> bool {
     let of_autopilot = |message| matches!(message, Incoming::Heartbeat { kind, autopilot, .. } if Kind::of(autopilot, kind).is_some());
     received.from.component == AUTOPILOT && received.message.is_some_and(of_autopilot)

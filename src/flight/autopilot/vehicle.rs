@@ -1,5 +1,7 @@
-//! State of the autopilot as received. It has the kind, reports and clock, the delay of the link, the drone's position, and the
-//! noise that a SiK radio measures.
+//! State of the autopilot, from received messages.
+//!
+//! It has the autopilot's kind, reports and clock, the delay of the link, the drone's position, and the noise measured
+//! by a SiK radio.
 
 use super::state::{FlightMode, Kind, Observed};
 use crate::features::SENSING;
@@ -15,11 +17,12 @@ use crate::time::{Duration, Instant};
 /// Time without a heartbeat after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Age from which on a received position of the drone is too old to be used.
+/// Age at which a received position of the drone is too old to be used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// Silence of the autopilot after which a PX4 has possibly entered its failsafe. A PX4 does so after a second without a
-/// target, and a target is sent every 0.2 s.
+/// Silence of the autopilot after which a PX4 is possibly in its failsafe.
+///
+/// A PX4 enters it after a second without a target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
 /// Assumed maximum time from the measurement of a position to the transmission of its message.
@@ -57,7 +60,7 @@ pub struct Position {
     pub velocity_m_s: [f32; 3],
 }
 
-/// Kind of news that a received MAVLink message has for the link.
+/// News in a received MAVLink message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum VehicleUpdate {
     /// The message is of another sender, or has no new information.
@@ -90,33 +93,31 @@ pub(super) struct Vehicle {
     /// Time at which the last message of any kind was received from the autopilot; `None` before the first.
     frame_at: Option<Instant>,
     mode: u32,
-    /// True while the autopilot's mode is OFFBOARD or GUIDED, in which the relay sets the target.
+    /// True while the autopilot is in OFFBOARD or GUIDED, in which the relay sets the target.
     granted: bool,
     /// Value of `MAV_STATE` in the autopilot's last heartbeat.
     status: u8,
-    /// True if OFFBOARD or GUIDED counts as the pilot's choice. This is about the present mode, or about the next
-    /// change to OFFBOARD or GUIDED. See [`Self::review_choice`].
+    /// True if the present or next OFFBOARD or GUIDED counts as the pilot's choice. See [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
-    /// Time since which the landed state has been "on the ground"; `None` in another or unknown state.
+    /// Start of the time in which the autopilot reports "on the ground". `None` if it does not.
     grounded_at: Option<Instant>,
-    /// True while the drone is outside of the autopilot's fence.
+    /// True while the drone is outside of the autopilot's geofence.
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// Measurement time of the last position; `None` before the first. Positions too far from the line Tx to Rx count,
-    /// too.
+    /// Measurement time of the last position, also of one too far from the line Tx to Rx. `None` before the first.
     measured_at: Option<Instant>,
     position: Option<Position>,
-    /// Place to return to (HOME_POSITION); `None` if unknown.
+    /// Position to return to (HOME_POSITION); `None` if unknown.
     home: Option<Geodetic>,
     pub(super) battery: Battery,
 }
 
 impl Vehicle {
     /// Processes a received message. After the first heartbeat of an autopilot, messages of all other senders are
-    /// ignored: the same port can also receive other vehicles.
+    /// ignored, because the port can also receive other vehicles.
     pub(super) fn read(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
@@ -139,11 +140,11 @@ impl Vehicle {
         if self.address() != Some(from) {
             return VehicleUpdate::Nothing;
         }
-        // The battery's messages come at their own rate: they do not show that the link works.
+        // The battery's messages come at their own rate. They do not show that the link works.
         if self.read_battery(now, message) {
             return VehicleUpdate::StateChanged;
         }
-        // A gap counts even if no timeout was handled meanwhile.
+        // A gap in the reception counts even if no timeout was handled in it.
         self.review_choice(now);
         self.frame_at = Some(now);
         let heard = self.take(now, message, axis);
@@ -164,7 +165,7 @@ impl Vehicle {
                 let says_mode = base_mode & CUSTOM_MODE != 0;
                 self.granted = says_mode && self.mode() == Some(FlightMode::Companion);
                 let is_armed = base_mode & ARMED != 0;
-                // A flight has ended. A PX4 that landed by itself is in OFFBOARD again.
+                // A flight has ended. A PX4 that has landed without the pilot is in OFFBOARD again.
                 self.chosen &= is_armed || !self.armed;
                 self.armed = is_armed;
                 if says_mode && !self.granted && !self.is_late(now) {
@@ -199,7 +200,7 @@ impl Vehicle {
                     self.restart();
                     return VehicleUpdate::Restarted;
                 };
-                // The message was sent after the question of the last echo, and the position was measured shortly before that.
+                // The message was sent after the last answered request, and the position was measured shortly before.
                 let floor = self.echo.floor().map(|at| {
                     Instant::from_micros(at.as_micros().saturating_sub(MEASURED.as_micros()))
                 });
@@ -214,7 +215,7 @@ impl Vehicle {
                     amsl_mm,
                 };
                 let Some(place) = axis.place(point) else {
-                    // Without a fix the position is 0, 0, which is near no line worth flying.
+                    // Without a fix the position is 0, 0, which is near no usable line.
                     return if (lat_e7, lon_e7) != (0, 0) && point.is_valid() {
                         VehicleUpdate::OffLine(point)
                     } else {
@@ -236,7 +237,7 @@ impl Vehicle {
                 self.is_breached = is_breached;
                 VehicleUpdate::StateChanged
             }
-            // A question of the autopilot contains no time of this link.
+            // A request of the autopilot contains no time of this link.
             Incoming::TimeSync {
                 answered: 1..,
                 asked,
@@ -252,13 +253,15 @@ impl Vehicle {
         }
     }
 
-    /// Withdraws the right to control the drone if the autopilot has possibly changed its mode by itself.
+    /// Withdraws the right to control the drone if its mode has possibly changed without the pilot.
     ///
-    /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its
-    /// failsafe after a second without one. A PX4 is therefore sent targets only after it has reported a mode other
-    /// than OFFBOARD outside of a failsafe: since the link started, since the last failsafe, and since the link was
-    /// last interrupted or late. An ArduCopter does not change to GUIDED by itself. An ArduCopter only needs to have
-    /// reported another mode once: since the start of the link, and since its last silence.
+    /// A PX4 in its failsafe resumes OFFBOARD once it receives targets. In OFFBOARD it enters its failsafe after a
+    /// second without a target. So a PX4 is sent targets only after it has reported a mode other than OFFBOARD outside
+    /// of a failsafe. The report must be newer than the start of the link, the last failsafe, and the last time at
+    /// which the link was interrupted or late.
+    ///
+    /// An ArduCopter does not change to GUIDED without the pilot. It only needs to have reported another mode once
+    /// since the start of the link and since its last silence.
     pub(super) fn review_choice(&mut self, now: Instant) {
         let before = |at: Option<Instant>, limit| at.is_some_and(|at| now.since(at) < limit);
         self.chosen &= match self.kind() {
@@ -273,13 +276,13 @@ impl Vehicle {
         };
     }
 
-    /// Withdraws the right to control the drone because targets were not sent in time. The pilot has to choose the
-    /// mode anew.
+    /// Withdraws the right to control the drone, because targets were not sent in time. The pilot has to choose the
+    /// mode again.
     pub(super) const fn unchoose(&mut self) {
         self.chosen = false;
     }
 
-    /// Returns true if messages of the autopilot are possibly delayed, so that they show an old state.
+    /// Returns true if the autopilot's messages are possibly delayed and show an old state.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         self.echo.is_late(now) || self.measured_at.is_none_or(|at| now.since(at) >= STALE)
     }
@@ -321,8 +324,8 @@ impl Vehicle {
         self.home = None;
     }
 
-    /// Converts the stored position to another line from Tx to Rx by the function `moved`. The position is dropped if
-    /// `moved` returns `None`.
+    /// Converts the stored position to another line from Tx to Rx by `moved`. If `moved` returns `None`, the position
+    /// is dropped.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -330,10 +333,10 @@ impl Vehicle {
         });
     }
 
-    /// Records a message about the battery, or about the place to return to. Returns false for any other message.
+    /// Records a message about the battery or the home position. Returns false for any other message.
     fn read_battery(&mut self, now: Instant, message: Incoming) -> bool {
         match message {
-            // On the ground a PX4 computes the time from an assumed current.
+            // On the ground a PX4 computes the remaining time from an assumed current.
             Incoming::Battery {
                 battery,
                 percent,
@@ -359,8 +362,9 @@ impl Vehicle {
 
     /// Returns the newest remaining time of flight and the time of the flight home, s.
     ///
-    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for an unknown time. The
-    /// time of the flight home is unknown without a recent position, and if the home is too far from the line Tx to Rx.
+    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for an
+    /// unknown time. The time of the flight home is unknown without a recent position. It is also unknown if the home
+    /// is too far from the line Tx to Rx.
     pub(super) fn take_endurance(&mut self, now: Instant, axis: &Axis) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
         let home = axis.place(self.home?);
@@ -399,14 +403,15 @@ impl Vehicle {
         }
     }
 
-    /// Returns the drone's position if it is known and recent, and the drone is in the air; else `None`.
+    /// Returns the drone's position if it is recent and the drone is in the air; otherwise `None`.
     pub(super) fn place_in_air(&self, now: Instant) -> Option<Placement> {
         let position = self.position(now)?;
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the time at which the next received value becomes too old, if no new message comes before. A TIMESYNC
-    /// request that is due earlier also counts. `None` if there is no such time.
+    /// Returns the time of the next change without a new message; `None` if there is none.
+    ///
+    /// The change is that a received value becomes too old, or that a TIMESYNC request is due.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -419,31 +424,33 @@ impl Vehicle {
     }
 }
 
-/// Time for which an armed drone must report that it is on the ground before it counts as landed. A single wrong report
-/// in flight thus has no effect.
+/// Time for which an armed drone must report to be on the ground before it counts as landed.
+///
+/// A single wrong report in flight then has no effect.
 const LANDED: Duration = Duration::from_millis(2_000);
-/// Age from which on a BATTERY_STATUS or a position is too old for the endurance. SYS_STATUS is then used instead of
-/// BATTERY_STATUS, and the time of the flight home is unknown.
+/// Age at which a BATTERY_STATUS or a position is too old for the endurance.
+///
+/// SYS_STATUS is then used instead of BATTERY_STATUS, and the time of the flight home is unknown.
 const OLD: Duration = Duration::from_millis(10_000);
-/// Factor on the remaining time that the autopilot reports: 10 % are a reserve.
+/// Factor on the remaining time that the autopilot reports. It leaves a reserve of 10 %.
 const CERTAIN: f32 = 0.9;
 
-/// Remaining time of flight, from the battery's messages.
+/// Remaining time of flight according to the battery's messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Arguments of `Autopilot::set_endurance`. `None` before its first call: [`UNSET`](Self::UNSET) is used, and no
-    /// messages are requested.
+    /// Arguments of `Autopilot::set_endurance`; `None` before its first call. Then [`UNSET`](Self::UNSET) is used, and
+    /// no messages are requested.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
-    /// Remaining time of flight, s; NaN if unknown. `None` once the link has taken it, and on the ground.
+    /// Remaining time of flight, s; NaN if unknown. `None` on the ground, and once it has been read.
     newest: Option<f32>,
 }
 
 impl Battery {
     const UNSET: [f32; 3] = [f32::NAN, 5.0, 1.5];
 
-    /// Returns true if a message about `battery` is used: BATTERY_STATUS of battery 0. SYS_STATUS (`None`) is used only
-    /// if no such BATTERY_STATUS came in the last 10 s.
+    /// Returns true if a message about `battery` is used. BATTERY_STATUS is used for battery 0. SYS_STATUS (`None`) is
+    /// used only if no such BATTERY_STATUS came in the last 10 s.
     fn is_first(&mut self, now: Instant, battery: Option<u8>) -> bool {
         if battery == Some(0) {
             self.detailed_at = Some(now);
@@ -452,9 +459,9 @@ impl Battery {
         battery.map_or(is_only, |id| id == 0)
     }
 
-    /// Returns the remaining time of flight, s: the reported time, or else computed from the percentage.
+    /// Returns the remaining time of flight, s: the reported time, or one computed from the percentage.
     ///
-    /// NaN if the percentage is not valid: then a PX4 has no estimate of the time either.
+    /// NaN if the percentage is not valid. A PX4 then has no estimate of the time either.
     #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
     fn left_s(&self, percent: i8, remaining_s: i32) -> f32 {
         if !(0..=100).contains(&percent) {
@@ -467,8 +474,7 @@ impl Battery {
     }
 }
 
-/// Newest noise measurement of a SiK radio for the relay: drone's position, noise in W. `None` once the relay has
-/// taken it.
+/// Newest noise measurement of a SiK radio: drone's position, and noise in W. `None` once it has been read.
 #[derive(Clone, Debug)]
 pub(super) struct RadioNoise(Option<(Placement, f32)>);
 
@@ -483,7 +489,7 @@ impl RadioNoise {
         }
     }
 
-    /// Removes and returns the noise measurement, for the relay; `None` if there is no new one.
+    /// Removes and returns the noise measurement; `None` if there is no new one.
     pub(super) fn take(&mut self) -> Option<Sample> {
         let (at, power_w) = self.0.take()?;
         Some(Sample::Heard { at, power_w })
@@ -492,7 +498,7 @@ impl RadioNoise {
 
 const PERIOD: Duration = Duration::from_millis(500);
 
-/// Maximum age of the newest TIMESYNC request with a reply. If it is older, the link counts as late.
+/// Maximum age of the newest answered TIMESYNC request before the link counts as late.
 const LATE: Duration = Duration::from_millis(1_500);
 
 const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
@@ -500,33 +506,33 @@ const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
 /// Maximum age of a TIMESYNC request whose reply is still accepted.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// Number of low bits of a TIMESYNC request's time stamp that hold the link's tag. The higher bits hold the link's
-/// time in µs, enough for 200 days. The autopilot returns all bits unchanged.
+/// Number of low bits of a TIMESYNC time stamp that contain the link's tag. The higher bits contain the link's time in
+/// µs, enough for 200 days. The autopilot returns all bits unchanged.
 const SHIFT: u32 = 20;
 /// Tag in the TIMESYNC requests of a link whose seed was not set.
 const TAG: u32 = 0xA_52A5;
 
-/// Measurement of the delay of the link to the autopilot by echoes (TIMESYNC). The measurement gives an upper bound of
-/// the age of received messages.
+/// Delay of the link to the autopilot, measured by echoes (TIMESYNC). It gives an upper bound of the age of received
+/// messages.
 ///
 /// A cable, a radio or a router can buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock
-/// can run slow. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in
-/// order: a message received after a reply was sent after the request, so it is not older than the request.
+/// can run slow. So the link sends its time twice a second, and the autopilot returns it. Bytes stay in order: a
+/// message received after a reply was sent after the request, so it is not older than the request.
 ///
-/// A request has a tag, drawn at each start of the companion. A reply buffered since before a restart therefore does
-/// not count.
+/// A request has a tag, drawn at each start of the companion. So a reply buffered since before a restart does not
+/// count.
 ///
-/// An autopilot that has not replied within [`SUPPORT_TIMEOUT`] of the first request does not support echoes. Then
-/// only the time stamps of its positions show their ages. Until then a link that has just started counts as late. An
+/// An autopilot that has not replied within [`SUPPORT_TIMEOUT`] of the first request does not support echoes. Then only
+/// the time stamps of its positions show their ages. Until then a link that has just started counts as late. An
 /// autopilot that has replied once counts as late whenever it does not reply.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Tag in the low bits of every request, by which this link recognises the replies to its own requests.
+    /// Tag in the low bits of every request. It shows which replies belong to this link.
     tag: u32,
     due: Option<Instant>,
-    /// Time of the first TIMESYNC request to the autopilot; `None` before it.
+    /// Time of the first TIMESYNC request; `None` before it.
     begun_at: Option<Instant>,
-    /// Time at which the newest TIMESYNC request with a reply was sent; `None` without a reply.
+    /// Time of the newest answered TIMESYNC request; `None` without a reply.
     answered_at: Option<Instant>,
 }
 
@@ -542,8 +548,9 @@ impl Default for Echo {
 }
 
 impl Echo {
-    /// Sets the number that marks this link's TIMESYNC requests, derived from `seed`. By this number the link recognises the replies to its
-    /// own requests.
+    /// Sets the tag of this link's TIMESYNC requests, derived from `seed`.
+    ///
+    /// The tag shows which replies belong to this link.
     pub(super) const fn seed(&mut self, seed: u32) {
         self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
     }
@@ -566,7 +573,7 @@ impl Echo {
         Some(now.as_micros() << SHIFT | u64::from(self.tag))
     }
 
-    /// Processes the reply to a TIMESYNC request; `question` is the request's time stamp in the reply.
+    /// Processes the reply to a TIMESYNC request. `question` is the request's time stamp.
     pub(super) fn handle_reply(&mut self, now: Instant, question: u64) {
         let asked_at = Instant::from_micros(question >> SHIFT);
         let is_own = question & ((1 << SHIFT) - 1) == u64::from(self.tag) && asked_at <= now;
@@ -577,7 +584,7 @@ impl Echo {
 
     /// Returns the earliest time at which a message received now can have been sent; `None` if unknown.
     ///
-    /// It is the time of the last TIMESYNC request that the autopilot has answered: messages arrive in order.
+    /// It is the time of the last answered TIMESYNC request, because messages arrive in order.
     pub(super) const fn floor(&self) -> Option<Instant> {
         self.answered_at
     }
@@ -603,29 +610,28 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the time window over which the minimum delay of messages is taken. The halves are replaced in turn, so
-/// that the minimum covers the last 4 to 8 s.
+/// Half of the time window of the minimum delay. The halves are replaced alternately, so that the minimum covers the
+/// last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of the time window over which the minimum delay is taken.
+/// Minimum number of messages in each half of the time window of the minimum delay.
 ///
-/// If the link pauses, a half can contain only the late messages that arrive after the pause. Their delay would then
-/// count as normal.
+/// Otherwise a half could contain only the late messages after a pause of the link. Their delay would then count as
+/// normal.
 const LEAST: u8 = 8;
 
 /// Assumed maximum relative drift between the clocks of relay and autopilot, as an exponent: 2^-10.
 ///
-/// If the clocks drift faster, messages seem late. The apparent delay is the drift during the window in which the
-/// minimum delay is taken.
+/// With a faster drift messages seem late: the drift during the window of the minimum delay counts as delay.
 const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's clock.
 ///
-/// The conversion uses the minimum difference between the two clocks, because this difference belongs to the message
-/// with the least delay. A message can be late because the link is slow, and it can seem late because the autopilot's
-/// clock has lost time. If the minimum were never renewed, every message would count as late for good once the
-/// autopilot's clock has lost time. Therefore the minimum is renewed within 4 s to 8 s of messages. After a
-/// lasting change of the link's delay or of the clock, messages count as late only for that long.
+/// The conversion uses the minimum difference between the two clocks, which belongs to the message with the least
+/// delay. A message can be late because the link is slow. It can also seem late because the autopilot's clock has lost
+/// time. Then every later message would count as late if the minimum were never renewed. So the minimum is renewed
+/// within 4 s to 8 s of messages. After a lasting change of the link's delay or of the clock, messages count as late
+/// only for that long.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RemoteClock {
     known: Option<Anchor>,
@@ -633,8 +639,8 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum of the relay's clock minus the autopilot's clock, µs, in each half of the time window. The first
-    /// number is for the previous half, the second for the present half.
+    /// Minimum of the relay's clock minus the autopilot's clock, µs. The first number is for the previous half of the
+    /// time window, the second for the present half.
     least: [i64; 2],
     since: Instant,
     messages: u8,
@@ -643,8 +649,8 @@ struct Anchor {
 }
 
 impl RemoteClock {
-    /// Returns the time at which a message was created, on the relay's clock. The message arrived at `now` and was created
-    /// `boot_ms` after the autopilot's start. Returns `None` if the autopilot has restarted.
+    /// Returns the time at which a message was created, on the relay's clock. It arrived at `now` and was created
+    /// `boot_ms` after the autopilot's start. `None` if the autopilot has restarted.
     pub(super) fn creation_time(&mut self, now: Instant, boot_ms: u32) -> Option<Instant> {
         let boot_us = i64::from(boot_ms) * 1_000;
         let difference = now.as_micros().cast_signed().saturating_sub(boot_us);
@@ -661,7 +667,7 @@ impl RemoteClock {
             self.creation_time(now, boot_ms);
             return None;
         }
-        // Messages arrive in order: a clock that goes back has lost time, and the link is not slower for that.
+        // Messages arrive in order. So a clock that goes back has lost time, and the link is not slower.
         let lost = back.max(0);
         let drifted = (now.since(before).as_micros() >> DRIFT).cast_signed();
         if now.since(known.since) >= HALF && known.messages >= LEAST {
@@ -685,7 +691,7 @@ impl RemoteClock {
 
 /// Converts `micros`, µs, to milliseconds, which wrap after 49 days like the autopilot's milliseconds.
 ///
-/// The function uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
+/// It uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
@@ -696,22 +702,21 @@ pub(super) const fn millis(micros: u64) -> u32 {
 /// Minimum time between two reports that the drone is too far from the line Tx to Rx.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// Maximum age of a reported position too far from the line Tx to Rx; an older one counts as unknown.
+/// Maximum age of a position too far from the line Tx to Rx. An older one counts as unknown.
 const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 
-/// Position of a drone that is too far from the line Tx to Rx for the mission's coordinates. Also has the drone's distance from the line.
+/// Position of a drone too far from the line Tx to Rx for the mission's coordinates.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OffLine {
-    /// Position of the drone that the autopilot reports.
+    /// Position of the drone as reported by the autopilot.
     pub at: Geodetic,
-    /// Distance of the drone along the ground from the nearest point of the line Tx to Rx, m.
+    /// Distance along the ground from the nearest point of the line Tx to Rx, m.
     pub away_m: u32,
 }
 
 impl OffLine {
-    /// Returns the position `at` with its distance from the line `axis`; `None` if `at` is not on earth. Constant
-    /// work.
+    /// Returns the position `at` and its distance from the line `axis`. `None` if `at` is not on earth. Constant work.
     pub fn new(at: Geodetic, axis: &Axis) -> Option<Self> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -742,8 +747,9 @@ pub(super) struct OffLineDetector {
 }
 
 impl OffLineDetector {
-    /// Records a position of the drone that is too far from the line Tx to Rx. Returns true if a report is due: in the
-    /// air once in 10 s, on the ground once, until the drone has been near the line.
+    /// Records a position too far from the line Tx to Rx. Returns true if a report is due.
+    ///
+    /// In the air a report is due once in 10 s. On the ground one is due until the drone has been near the line again.
     pub(super) fn record(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;
@@ -756,13 +762,14 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone is near the line Tx-Rx. A drone on the ground that is far from the line after that is reported again.
+    /// Records that the drone is near the line Tx to Rx. The next time it is far from the line on the ground is
+    /// reported again.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;
     }
 
-    /// Returns the newest position if it is far from the line and less than 3 s old; else `None`.
+    /// Returns the newest position if it is far from the line and less than 3 s old; otherwise `None`.
     pub(super) fn newest(&self, now: Instant) -> Option<Geodetic> {
         let fresh = self
             .newest
@@ -795,7 +802,7 @@ mod tests {
         );
     }
 
-    /// Checks that the link counts as late as long as no TIMESYNC request has been sent.
+    /// Checks that the link counts as late until a TIMESYNC request has been sent.
     #[test]
     fn the_delay_is_unknown_before_the_first_request() {
         assert!(Echo::default().is_late(Instant::ZERO));
@@ -813,8 +820,8 @@ mod clock_tests {
 
     /// Simulates messages over a link with delays. Returns the age of each message by [`RemoteClock`], ms.
     ///
-    /// The autopilot sends a message every 200 ms for 80 s. `clock_ms` returns the autopilot's clock at a time, and
-    /// `delay` the link's delay at a time; all of them are in ms.
+    /// The autopilot sends a message every 200 ms for 80 s. `clock_ms` and `delay` return the autopilot's clock and the
+    /// link's delay at a time; all are in ms.
     fn ages(clock_ms: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();
@@ -835,7 +842,7 @@ mod clock_tests {
         assert_eq!(clock.creation_time(at(10_200), 700), Some(at(10_200)));
         let late = clock.creation_time(at(10_480), 900).expect("no restart");
         assert_eq!(at(10_480).since(late).as_micros() / 1_000, 79, "80 ms late");
-        // A faster message shows that all earlier ones were late.
+        // A faster message shows that all earlier messages were late.
         assert_eq!(clock.creation_time(at(10_550), 1_100), Some(at(10_550)));
         let late = clock.creation_time(at(10_800), 1_300).expect("no restart");
         assert_eq!(at(10_800).since(late).as_micros() / 1_000, 49, "50 ms late");
@@ -844,7 +851,7 @@ mod clock_tests {
     #[test]
     fn a_clock_that_drifts_is_followed() {
         let mut clock = RemoteClock::default();
-        // The relay's is faster by 500 in a million: it gains half a second.
+        // The relay's clock is faster by 500 in a million: it gains half a second.
         for i in 0..5_000_u32 {
             let now = Instant::from_micros(u64::from(i) * 200_100);
             let true_at = clock.creation_time(now, i * 200).expect("the same start");
@@ -852,8 +859,8 @@ mod clock_tests {
         }
     }
 
-    /// Checks that messages count as recent although the autopilot's clock runs 1 % slow. The clock of a simulator on
-    /// a loaded machine can be so slow.
+    /// Checks that messages count as recent if the autopilot's clock runs 1 % slow. A simulator's clock on a loaded
+    /// machine can be so slow.
     #[test]
     fn a_clock_that_runs_one_percent_slow_is_never_blind() {
         let ages = ages(|ms| ms - ms / 100, |_| 5);
@@ -870,7 +877,7 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20), "{ages:?}");
     }
 
-    /// Checks a link whose delay jumps from 5 ms to 1.5 s: for 3 s its messages count as more than 1 s old. From 9 s
+    /// Checks a link whose delay jumps from 5 ms to 1.5 s. For 3 s its messages count as more than 1 s old. From 9 s
     /// after the jump on, the new delay counts as normal.
     #[test]
     fn a_delay_that_grows_is_late_at_first() {
@@ -879,8 +886,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20));
     }
 
-    /// Checks messages that a cable holds back and delivers at once after 7 s. The age of the first message is 7 s.
-    /// Each later message has a smaller age, because it was sent later.
+    /// Checks messages that a cable delivers all at once after 7 s. The age of the first message is 7 s. Each later
+    /// message has a smaller age, because it was sent later.
     #[test]
     fn a_burst_after_a_gap_is_old() {
         let held = 20_000..27_000;

@@ -34,8 +34,8 @@ pub const MAX_FRAME: usize = HEADER + MAX_PAYLOAD + CHECKSUM + SIGNATURE;
 /// Incompatibility flag that marks a signed MAVLink frame.
 pub const SIGNED: u8 = 1;
 
-/// Checksum of MAVLink, computed bit by bit. A table would take a kilobyte of flash, and a link to an autopilot
-/// carries only some ten kilobytes a second.
+/// CRC of MAVLink, computed bit by bit. A table would take a kilobyte of flash, and a link to an autopilot transports
+/// only some ten kilobytes a second.
 static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 
 /// MAVLink address: sender or addressee of a message.
@@ -44,12 +44,11 @@ static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 pub struct Address {
     /// MAVLink system id of the sender or addressee, 1 to 255.
     pub system: u8,
-    /// Component id of MAVLink: 1 is the autopilot, 191 an onboard computer.
+    /// MAVLink component id: 1 is the autopilot, 191 an onboard computer.
     pub component: u8,
 }
 
-/// Returns the checksum of a frame. `covered` has the bytes after the start byte. `known` has the CRC seed of the
-/// message.
+/// Returns the checksum of a frame. `covered` are its bytes after the start byte. `known` has the message's CRC seed.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);
@@ -57,15 +56,15 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
     digest.finalize()
 }
 
-/// Properties of a kind of MAVLink message that the checksum and the parser need.
+/// Properties of a MAVLink message that the checksum and the parser need.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Known {
-    /// Id of the kind of MAVLink message, 24 bits.
+    /// Id of the MAVLink message, 24 bits.
     pub id: u32,
-    /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
+    /// CRC seed: a digest of the message's definition, so that both ends use the same one.
     pub crc_extra: u8,
-    /// Length of the message's original fields, bytes, without extensions of later dialects.
+    /// Length of the original fields, bytes, without extensions of later dialects.
     pub length: u8,
 }
 
@@ -93,13 +92,13 @@ pub mod id {
     pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
     /// Message RADIO_STATUS: signal and noise level of a radio.
     pub const RADIO_STATUS: u32 = 109;
-    /// Message TIMESYNC: clock value, which the receiver sends back.
+    /// Message TIMESYNC: clock value, which the receiver of the message sends back.
     pub const TIMESYNC: u32 = 111;
     /// Message BATTERY_STATUS: state of one battery.
     pub const BATTERY_STATUS: u32 = 147;
     /// Message FENCE_STATUS: state of the vehicle's geofence.
     pub const FENCE_STATUS: u32 = 162;
-    /// Message HOME_POSITION: place where the vehicle returns to.
+    /// Message HOME_POSITION: position to which the vehicle returns.
     pub const HOME_POSITION: u32 = 242;
     /// Message EXTENDED_SYS_STATE: landed state of the vehicle.
     pub const EXTENDED_SYS_STATE: u32 = 245;
@@ -109,8 +108,8 @@ pub mod id {
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// Maximum number of bytes of extensions that a later dialect is assumed to add to a message. A longer message is
-/// treated as noise.
+/// Maximum length of the extensions that a later dialect may add to a message, bytes. A longer message is treated as
+/// noise.
 const ADDED: u8 = 24;
 
 impl Known {
@@ -128,9 +127,9 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that the parser knows. These are messages of this crate, and messages whose payload can contain frames.
+/// Messages that the parser knows: those of this crate, and those whose payload can contain frames.
 ///
-/// The parser skips a message with such a payload as a whole, so that it does not take a frame inside the payload for a
+/// The parser skips a message with such a payload as a whole. It thus does not take a frame inside the payload for a
 /// received one.
 const TABLE: [Known; 31] = [
     known(id::HEARTBEAT, 50, 9),

@@ -1,7 +1,8 @@
-//! Received messages and the parser of their byte stream. Senders are the autopilot, and ground stations through it.
+//! Received messages, and the parser of their byte stream.
 //!
-//! After an invalid frame the parser continues with the byte after its first one, so no valid frame after it is lost. A frame
-//! must have the id of a known message, so few false starts occur in noise and in other messages.
+//! Senders are the autopilot, and ground stations through it. After an invalid frame the parser continues with the byte
+//! after its first one, so no valid frame is lost. A frame must have the id of a known message, so few false starts
+//! occur in noise and in other messages.
 
 use super::frame::{
     Address, CHECKSUM, HEADER, Known, MAGIC, MAX_FRAME, MAX_PAYLOAD, SIGNATURE, SIGNED, checksum,
@@ -98,14 +99,14 @@ pub enum Incoming {
         /// Remaining time of flight, s; 0 is unknown.
         remaining_s: i32,
     },
-    /// HOME_POSITION: place where the vehicle returns to.
+    /// HOME_POSITION: position to which the vehicle returns.
     Home(Geodetic),
     /// EXTENDED_SYS_STATE: landed state of the vehicle.
     ExtendedSysState {
         /// Value of `MAV_LANDED_STATE`: 1 on the ground, 2 in the air, 3 taking off, 4 landing.
         landed_state: u8,
     },
-    /// POSITION_TARGET_LOCAL_NED: the vehicle's target in its local frame; only its kind is read.
+    /// POSITION_TARGET_LOCAL_NED: the vehicle's target in its local frame; only the mask is read.
     PositionTargetLocal {
         /// Mask of the target's values that the vehicle ignores: position, velocity, acceleration, yaw.
         type_mask: u16,
@@ -125,9 +126,9 @@ pub enum Incoming {
     },
     /// COMMAND_LONG: command with seven parameters.
     CommandLong {
-        /// Value of `MAV_CMD`, the number of the command.
+        /// Value of `MAV_CMD`: number of the command.
         command: u16,
-        /// Seven parameters of the command, whose meaning depends on `command`.
+        /// Parameters of the command. Their meaning depends on `command`.
         parameters: [f32; 7],
         /// MAVLink address of the addressee.
         to: Address,
@@ -136,7 +137,7 @@ pub enum Incoming {
     },
     /// COMMAND_ACK: reply to a command.
     CommandAck {
-        /// Value of `MAV_CMD`, the number of the command.
+        /// Value of `MAV_CMD`: number of the command.
         command: u16,
         /// Value of `MAV_RESULT`: 0 is accepted.
         result: u8,
@@ -145,7 +146,7 @@ pub enum Incoming {
     TimeSync {
         /// Clock of the replying system, ns; 0 in a request.
         answered: u64,
-        /// Time stamp of the request, which the reply repeats, in units that the requesting system chooses.
+        /// Time stamp of the request, repeated in the reply, in units of the requesting system.
         asked: u64,
     },
     /// FENCE_STATUS: state of the vehicle's geofence.
@@ -243,12 +244,13 @@ const SIK_PER_UNIT: f32 = 0.174_838_32;
 /// Level 0 of a SiK radio, -127 dBm, as the binary logarithm of the power in W: -15.7 log2(10).
 const SIK_ZERO: f32 = -52.154_27;
 
-/// Returns the noise power, W, for the value `noise` of a SiK radio's RADIO_STATUS.
+/// Returns the noise power for the value `noise` of a SiK radio's RADIO_STATUS, W.
 ///
-/// The radio's documentation states `signal_dBm = (RSSI / 1.9) - 127` as an approximation, and the same units for noise. `None` for 255
-/// (unknown), and for 0, which a radio reports before its first measurement.
+/// `None` for 255 (unknown), and for 0, which a radio reports before its first measurement. The radio's documentation
+/// states `signal_dBm = (RSSI / 1.9) - 127` as an approximation, and the same units for noise.
 ///
-/// Source: "SiK Radio, advanced configuration" of ArduPilot, on `LBT_RSSI`; mavros (`3dr_radio`) and INAV convert alike.
+/// Source: "SiK Radio, advanced configuration" of ArduPilot, on `LBT_RSSI`; mavros (`3dr_radio`) and INAV convert
+/// alike.
 pub fn noise_w(noise: u8) -> Option<f32> {
     (1..=254)
         .contains(&noise)
@@ -261,7 +263,7 @@ pub fn noise_w(noise: u8) -> Option<f32> {
 pub struct Received {
     /// MAVLink address of the sender.
     pub from: Address,
-    /// Decoded message; `None` for a kind of message that this crate does not read.
+    /// Decoded message; `None` if this crate does not read this kind of message.
     pub message: Option<Incoming>,
     /// MAVLink id of the received message.
     pub id: u32,
@@ -276,14 +278,14 @@ pub struct Counters {
     /// Number of valid MAVLink frames received.
     pub frames: u32,
     /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. Most are corrupted
-    /// frames; other bytes can also look like a frame.
+    /// frames, but other bytes can also look like a frame.
     pub broken: u32,
 }
 
 /// Parser of MAVLink frames, with a buffer of one frame of maximum length.
 #[derive(Clone, Debug, Default)]
 pub struct Parser {
-    /// Received bytes; if not empty, they start with a possible frame.
+    /// Received bytes. If there are any, they begin with a possible frame.
     bytes: Vec<u8, MAX_FRAME>,
     counters: Counters,
 }
@@ -322,16 +324,16 @@ impl Parser {
         }
     }
 
-    /// Returns the next received message, or `None`. Constant work for each byte, see
-    /// [`next_frame`](Self::next_frame).
+    /// Returns the next received message, or `None`. Constant work for each byte, see [`next_frame`](Self::next_frame).
     pub fn next_message(&mut self) -> Option<Received> {
         self.next_frame(|received, _| received)
     }
 
-    /// Returns the result of `read` for the next received message and the bytes of its frame; else `None`.
+    /// Calls `read` with the next received message and the bytes of its frame, and returns the result. `None` without a
+    /// message.
     ///
-    /// Work: for each received byte, at most one checksum over at most 266 bytes is computed. In real frames this
-    /// happens at no more than one byte in ten, in maliciously chosen bytes at one in three.
+    /// Work: for each received byte, at most one checksum over at most 266 bytes. In real frames one is computed at no
+    /// more than one byte in ten, in maliciously chosen bytes at one in three.
     pub fn next_frame<T>(&mut self, read: impl FnOnce(Received, &[u8]) -> T) -> Option<T> {
         while !self.bytes.is_empty() {
             match first(&self.bytes) {
@@ -353,12 +355,12 @@ impl Parser {
         None
     }
 
-    /// Returns the counts of valid and corrupted frames since the parser was created.
+    /// Returns the numbers of valid and corrupted frames since the parser was created.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// Discards the first `length` received bytes, and more bytes up to the next possible start of a frame.
+    /// Discards the first `length` received bytes, and the bytes up to the next possible start of a frame.
     fn drop_front(&mut self, length: usize) {
         let rest = self.bytes.get(length..).unwrap_or_default();
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();

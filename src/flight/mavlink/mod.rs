@@ -7,15 +7,16 @@
 //! | [`outgoing`] | messages of a companion |
 //! | `signing` | signatures, with the feature `mavlink-signing` |
 //!
-//! Unknown enum values and unknown messages cost only their bytes. MAVLink 1 is not supported; an autopilot that starts with it
-//! changes to MAVLink 2 once it has received a frame of that.
+//! Unknown enum values and unknown messages cost only their bytes. MAVLink 1 is not supported. An autopilot that starts
+//! with it changes to MAVLink 2 once it has received a MAVLink 2 frame.
 
 pub mod frame;
 pub mod incoming;
 pub mod outgoing;
 #[cfg(feature = "mavlink-signing")]
 pub mod signing;
-/// Signing without the feature `mavlink-signing`. The type is uninhabited, so that the compiler drops all code that signs.
+/// Signing without the feature `mavlink-signing`. The type has no values, so that the compiler drops all code that
+/// signs.
 #[cfg(not(feature = "mavlink-signing"))]
 pub(crate) mod signing {
     use super::incoming::Received;

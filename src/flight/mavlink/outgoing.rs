@@ -9,22 +9,22 @@ use crate::geodetic::Geodetic;
 /// Maximum payload length of the messages that this crate sends, bytes.
 const LONGEST: usize = 54;
 
-/// Number of bytes reserved for a signature; 0 if the crate was built without signing.
+/// Number of bytes reserved for a signature; 0 without the feature `mavlink-signing`.
 const SIGNING: usize = if MAVLINK_SIGNING { SIGNATURE } else { 0 };
 
 /// Length of the longest frame to send, bytes, with a signature.
 pub(crate) const FRAME: usize = HEADER + LONGEST + CHECKSUM + SIGNING;
 
-/// MAVLink frame to send; its capacity includes a signature.
+/// MAVLink frame to send. Its capacity includes a signature.
 pub type FrameBytes = Vec<u8, FRAME>;
 
-/// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
+/// Severities of [`Outgoing::StatusText`] (`MAV_SEVERITY`).
 pub mod severity {
     /// Severity of a problem that requires action now.
     pub const CRITICAL: u8 = 2;
-    /// Severity of a problem with which the flight continues.
+    /// Severity of a problem that does not end the flight.
     pub const WARNING: u8 = 4;
-    /// Severity of a piece of information for the operator.
+    /// Severity of information for the operator.
     pub const INFO: u8 = 6;
 }
 
@@ -33,20 +33,20 @@ pub mod severity {
 pub enum Outgoing<'a> {
     /// HEARTBEAT of an active onboard computer, the companion.
     Heartbeat,
-    /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: requests that a message is sent at an interval.
+    /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: request to send a message at an interval.
     SetMessageInterval {
         /// MAVLink id of the requested message.
         id: u32,
-        /// Interval requested between two of these messages, µs.
+        /// Interval between two of the requested messages, µs.
         interval_us: u32,
     },
     /// COMMAND_ACK: reply to a command.
     CommandAck {
         /// Value of `MAV_CMD`, the number of the command.
         command: u16,
-        /// Value of `MAV_RESULT`, the answer.
+        /// Value of `MAV_RESULT`: answer to the command.
         result: u8,
-        /// MAVLink address of the sender of the command, to which this reply goes.
+        /// MAVLink address to which the reply goes: the sender of the command.
         to: Address,
     },
     /// SET_POSITION_TARGET_GLOBAL_INT: target to fly to, above mean sea level (frame 5).
@@ -55,14 +55,14 @@ pub enum Outgoing<'a> {
         boot_ms: u32,
         /// Target position of the drone.
         at: Geodetic,
-        /// Target velocity toward north, east and down, m/s; `None` to stop at the target.
+        /// Target velocity toward north, east and down, m/s. `None` to stop at the target.
         velocity_m_s: Option<[f32; 3]>,
         /// Heading of the drone, radians clockwise from north; `None` leaves it to the autopilot.
         yaw_rad: Option<f32>,
     },
     /// TIMESYNC request, which the autopilot sends back.
     TimeSync {
-        /// Time stamp of the request, which the reply repeats.
+        /// Time stamp of the request, repeated in the reply.
         asked: u64,
     },
     /// STATUSTEXT: text for an operator, of at most 50 bytes; a longer text is truncated.
@@ -78,13 +78,14 @@ pub enum Outgoing<'a> {
         boot_ms: u32,
         /// Name of the number, at most ten bytes; a longer name is truncated.
         name: &'a str,
-        /// Value of the plotted quantity that `name` names.
+        /// Value of the number.
         value: f32,
     },
 }
 
-/// Bits of `type_mask` in a target message: values that the autopilot must ignore. Position (bits 0 to 2), velocity
-/// (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
+/// Bits of `type_mask` in a target message: values that the autopilot must ignore.
+///
+/// Position (bits 0 to 2), velocity (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
 mod mask {
     pub(super) const VELOCITY: u16 = 0b11_1000;
     pub(super) const ACCELERATION: u16 = 0b1_1100_0000;
@@ -110,7 +111,7 @@ impl Outgoing<'_> {
         }
     }
 
-    /// Encodes the message as an unsigned frame from `from`; `to` is the autopilot. Constant work.
+    /// Encodes the message as an unsigned frame from `from` to the autopilot `to`. Constant work.
     pub fn encode(&self, from: Address, to: Address, sequence: u8) -> FrameBytes {
         let mut writer = Writer(FrameBytes::new());
         let [a, b, c, _] = self.id().to_le_bytes();
@@ -222,12 +223,12 @@ impl Writer {
     fn bytes(&mut self, bytes: &[u8]) {
         debug_assert!(self.0.len() + bytes.len() <= self.0.capacity());
         for byte in bytes {
-            // There is room, as asserted.
+            // There is room for the byte, as asserted.
             let _ = self.0.push(*byte);
         }
     }
 
-    /// Writes `N` bytes: as much of `text` as fits, without a partial character, and zeros.
+    /// Writes `N` bytes: the part of `text` that fits, without a partial character, then zeros.
     fn text<const N: usize>(&mut self, text: &str) {
         let mut end = text.len().min(N);
         while !text.is_char_boundary(end) {

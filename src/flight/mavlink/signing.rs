@@ -6,13 +6,13 @@
 //! | 1 to 6 | timestamp: 10 µs units since 2015-01-01, little-endian; it rises from frame to frame of a link |
 //! | 7 to 12 | first 6 bytes of SHA-256 over the key, the frame up to its checksum, link id and timestamp |
 //!
-//! A frame is accepted if its signature is right and its timestamp is above the last one of its sender and link. The first
-//! timestamp of a sender may be up to a minute behind the own one. An accepted timestamp advances the own one, so both ends share
-//! one time.
+//! A frame is accepted if its signature is right and its timestamp is above the last one of its sender and link. The
+//! first timestamp of a sender may be up to a minute behind this link's time. An accepted timestamp advances this
+//! link's time, so both ends share one time.
 //!
-//! *A board without a clock* starts in 2015. Until it has accepted a frame it cannot distinguish an old one from a new one, so a
-//! replayed recording may be accepted first; after the first current frame none is. Its own frames before that are too old for an
-//! autopilot with a clock, which ignores them.
+//! *A board without a clock* starts in 2015. Until it has accepted a frame it cannot distinguish an old one from a new
+//! one, so a replayed recording may be accepted first. After the first current frame none is. Its frames before that
+//! are too old for an autopilot with a clock, which ignores them.
 
 use sha2::{Digest as _, Sha256};
 
@@ -35,16 +35,16 @@ const LAST: u64 = (1 << 48) - 1;
 
 const UNIT_US: u32 = 10;
 
-/// Seconds from 1970-01-01 to 2015-01-01, where signature timestamps start.
+/// Time from 1970-01-01 to 2015-01-01, where the timestamps of signatures start, s.
 const BEGIN_S: u64 = 1_420_070_400;
 
-/// Number of senders whose timestamps are remembered. There can be several senders, because an autopilot forwards
-/// frames that other systems have signed.
+/// Number of senders whose timestamps are remembered. An autopilot also forwards frames that other systems have signed.
 const SENDERS: usize = 8;
 
-/// Sender of signed frames, with the minimum timestamp of its next frame, which prevents replays. If [`SENDERS`]
-/// senders are known, a new one replaces the sender whose last frame is the oldest. Frames of the replaced sender
-/// that are at most a minute old could then be replayed.
+/// Sender of signed frames, with the minimum timestamp of its next frame, which prevents replays.
+///
+/// If [`SENDERS`] senders are known, a new one replaces the sender whose last frame is the oldest. Frames of the
+/// replaced sender that are at most a minute old could then be replayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
@@ -53,12 +53,12 @@ struct Sender {
     next: u64,
 }
 
-/// Time in the units of a signature's timestamp: 10 µs since 2015-01-01.
+/// Timestamp of a signature: time since 2015-01-01 in units of 10 µs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Stamp(u64);
 
 impl Stamp {
-    /// Time stamp for signatures on a board that does not know the time.
+    /// Timestamp on a board that does not know the time.
     pub const UNKNOWN: Self = Self(0);
 
     /// Converts a Unix time, µs since 1970-01-01.
@@ -74,7 +74,7 @@ impl Stamp {
 pub enum Flaw {
     /// The received MAVLink frame has no signature.
     Unsigned,
-    /// The signature is of another key, or the frame was altered.
+    /// The signature was made with another key, or the frame was altered.
     Key,
     /// The signature's timestamp is in the past, or was used before.
     Old,
@@ -88,7 +88,7 @@ pub struct Signing {
     /// Timestamp of this link at the time `at`, in units of 10 µs.
     stamp: u64,
     at: Instant,
-    /// Timestamp in the signature of the last sent MAVLink frame, in units of 10 µs.
+    /// Timestamp of the last sent frame, in units of 10 µs.
     sent: u64,
     senders: [Sender; SENDERS],
 }
@@ -101,7 +101,7 @@ impl core::fmt::Debug for Signing {
 }
 
 impl Signing {
-    /// Creates signing with `key` on the link id `link`; `stamp` is the timestamp at `now`.
+    /// Creates signing with `key` and the link id `link`. `stamp` is the timestamp at `now`.
     pub const fn new(key: [u8; 32], link: u8, stamp: Stamp, now: Instant) -> Self {
         const NOBODY: Sender = Sender {
             from: Address {
@@ -121,7 +121,7 @@ impl Signing {
         }
     }
 
-    /// Advances the time stamp for signatures to `now`, by at most about an hour per call.
+    /// Advances the timestamp to `now`, by at most about an hour per call.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;

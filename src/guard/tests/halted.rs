@@ -1,4 +1,4 @@
-//! Tests: starts anywhere in the air, and the halt of a chain with one relay out of order.
+//! Tests of starts anywhere in the air, and of the halt of a chain with one relay out of order.
 
 use super::*;
 
@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Reports the position `place` to the guard, for the tests. The time is long after the guard's last setpoint.
+    /// Reports the position `place` to the guard, long after its last setpoint.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);
@@ -19,8 +19,8 @@ impl One {
     }
 }
 
-/// Returns a message of a neighbour that knows this relay's association (session), for the tests. The message has the
-/// fence number `number`, and `x_m` as the neighbour's x and agreed x.
+/// Returns a message of a neighbour that knows this relay's association (session). It has the fence number `number`,
+/// and `x_m` as the neighbour's x and agreed x.
 fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
     let echo = one.sent(side).association;
     Fence {
@@ -37,14 +37,15 @@ fn the_first_setpoint_holds_until_the_order_is_known() {
         now: Instant::ZERO,
     };
     one.guard.commit(at(60.0));
-    // Above its neighbour, to the side, and outside of the geofence.
+    // The relay is above its neighbour, to the side, and outside of the geofence.
     let high = aside(100.0, -80.0, 160.0);
     one.is_at_place(high);
     for _ in 0..20 {
         one.is_at_place(high);
         assert_eq!(one.guard.setpoint(), Some(high));
     }
-    // The neighbour is reported 3 m beyond: the two move apart along x before either moves across the line.
+    // The neighbour is reported 3 m beyond. The two move apart along x before either changes its lateral offset or
+    // altitude.
     let told = answer(&mut one, Side::Downstream, 103.0, 0);
     one.receive(Side::Downstream, 2, told);
     let first = one.guard.setpoint().unwrap();
@@ -71,9 +72,10 @@ fn a_start_outside_the_geofence_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Checks that relays too close along x to tell their order count as in order only if they may pass. Their reported x
-/// differ by less than the errors of the reports. They may pass each other if lateral offset and altitude keep them at
-/// least the separation apart.
+/// Checks that relays with an uncertain order along x count as in order only if they may pass.
+///
+/// The order is uncertain if their reported x differ by less than the errors of the reports. They may pass each other
+/// if lateral offset and altitude keep them at least the separation apart.
 #[test]
 fn relays_within_the_error_are_in_order_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
@@ -111,8 +113,8 @@ fn relays_within_the_error_are_in_order_if_they_may_pass() {
     }
 }
 
-/// Checks that two neighbours in the wrong order along x halt the relay between them. Within the errors of the
-/// reports, each of the two neighbours may seem to be on the correct side of this relay.
+/// Checks that two neighbours in the wrong order along x halt the relay between them. Within the errors of the reports,
+/// each of them may seem to be on the correct side of this relay.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -137,8 +139,8 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     }
 }
 
-/// Checks that a relay on its way that receives a halt request stops at its last reported position. The relay
-/// continues when the halt ends or expires.
+/// Checks that a moving relay that receives a halt request stops at its last reported position. It continues when the
+/// halt ends or expires.
 #[test]
 fn a_relay_that_halts_on_its_way_stops_there() {
     for forgotten in [false, true] {
@@ -177,8 +179,8 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// Checks that a relay that halts on its way into the geofence stops at its position outside. A neighbour may be at
-/// the nearest position inside.
+/// Checks that a relay that halts on its way into the geofence stops outside. A neighbour may be at the nearest
+/// position inside.
 #[test]
 fn a_relay_that_halts_outside_the_geofence_stops_there() {
     let mut one = One {
@@ -207,15 +209,15 @@ fn a_relay_that_halts_outside_the_geofence_stops_there() {
     one.guard.position(one.now, midway);
     one.receive(Side::Downstream, 2, halts);
     assert_eq!(one.guard.setpoint(), Some(midway));
-    // No report makes it go farther out than where it came from.
+    // No report makes the relay go farther out than it was.
     one.receive(Side::Downstream, 2, told);
     one.guard.position(one.now, aside(100.0, 0.0, 190.0));
     one.receive(Side::Downstream, 2, halts);
     assert_eq!(one.guard.setpoint(), Some(high));
 }
 
-/// Checks that a halt request outlasts a reboot of the neighbour that sent it. The rebooted neighbour does not know
-/// its earlier request, so its first messages do not withdraw it.
+/// Checks that a halt request outlasts a reboot of its sender. The rebooted relay does not know the request, so its
+/// first messages do not withdraw it.
 #[test]
 fn a_halt_outlasts_a_reboot_of_its_requester() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -252,7 +254,7 @@ fn a_halt_outlasts_a_reboot_of_its_requester() {
     }
 }
 
-/// Checks that the chain halts if a pilot gives a drone back on the wrong side of a neighbour.
+/// Checks that the chain halts if a drone is flown again on the wrong side of a neighbour.
 #[test]
 fn a_relay_flown_again_out_of_order_requests_a_halt() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -278,7 +280,7 @@ fn a_relay_flown_again_out_of_order_requests_a_halt() {
     }
 }
 
-/// Checks that a halt request is forwarded by a relay that is in manual control or has just started.
+/// Checks that a relay in manual control, and one that has just started, forward a halt request.
 #[test]
 fn a_halt_passes_a_relay_that_is_not_flown() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -296,7 +298,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     assert_eq!((told.flags, told.x_m), (flags, 100.0));
     assert!(told.is_valid());
     assert!(one.guard.poll().is_none());
-    // Its neighbour upstream, which is flown, halts because of that, and leaves no association for it.
+    // The upstream neighbour, which flies to setpoints, then halts, and has no association with this relay.
     let mut before = One::new([None, Some(2)], 50.0, 60.0);
     let known = answer(&mut before, Side::Downstream, 100.0, 0);
     before.receive(Side::Downstream, 2, known);
@@ -305,8 +307,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     assert_eq!(before.setpoint().to_bits(), 55.0_f32.to_bits());
 }
 
-/// Checks that a relay in manual control reports that it is on the wrong side of a neighbour. The neighbour flies to
-/// its setpoints.
+/// Checks that a relay in manual control reports that it is on the wrong side of a flown neighbour.
 #[test]
 fn an_unflown_relay_reports_that_it_is_out_of_order() {
     let mut one = One {
@@ -365,7 +366,7 @@ fn a_relay_moves_away_from_a_silent_one_before_across() {
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
 }
 
-/// Checks that a relay stays where it is if a neighbour on its wrong side becomes silent. The chain halts until an
+/// Checks that a relay keeps its position if a neighbour on its wrong side becomes silent. The chain halts until an
 /// operator reports the silent neighbour as gone.
 #[test]
 fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
@@ -423,8 +424,8 @@ fn a_reported_position_in_manual_flight_avoids_a_halt() {
     }
 }
 
-/// Checks that a late fence message, sent before a reboot, is not taken as the position of its sender. A message with
-/// a fence number has the x of the fence (limit of x), which may be far from the sender.
+/// Checks that a late fence message from before a reboot is not taken as its sender's position. Its x is that of the
+/// fence (limit of x), which may be far from the sender.
 #[test]
 fn an_old_fence_gives_no_position_of_its_owner() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -448,7 +449,7 @@ fn an_old_fence_gives_no_position_of_its_owner() {
 }
 
 /// Checks that a relay reports the lowest x of itself and of the relays downstream. Relay 3 is 2.5 m before relay 2
-/// along x, within the errors of their reports, so relay 2 has to report the x of relay 3.
+/// along x, within the errors of their reports. So relay 2 has to report the x of relay 3.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {
@@ -473,7 +474,7 @@ fn gaps_that_are_negative_by_the_error_add_up() {
             let guard = &mut guards[k];
             guard.commit(end);
             guard.position(now, place);
-            // Setpoints are not flown: the message of relay 2 is checked before any move.
+            // The relays do not fly to their setpoints here: the message of relay 2 is checked before any move.
             guard.steer(now);
             guard.remind();
             while let Some((side, to, fence)) = guards[k].poll() {
@@ -497,8 +498,10 @@ fn gaps_that_are_negative_by_the_error_add_up() {
 }
 
 /// Checks that relay 2 raises its fence (limit of x for relay 3) after relay 1 has started beside it. Relay 3 has
-/// passed the lower fence before. Relay 1, upstream, is in order with relay 2 only within the error of the reports,
-/// so that the fence of relay 2 must be the separation beyond relay 1, too (rule 7).
+/// passed the lower fence before.
+///
+/// Relay 1, upstream, is in order with relay 2 only within the error of the reports. So the fence of relay 2 must be
+/// the separation beyond relay 1, too (rule 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

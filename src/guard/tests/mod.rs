@@ -1,4 +1,4 @@
-//! Tests of the guard's rules, with messages passed by hand.
+//! Tests of the guard's rules. The tests pass the messages.
 
 use crate::guard::config::{Geofence, GuardConfig};
 use crate::guard::own::{Own, ReachableInterval};
@@ -33,8 +33,8 @@ fn at(x_m: f32) -> Placement {
     Placement::on_line(x_m, 50.0)
 }
 
-/// Returns the first message of a neighbour for the tests, at `x_m`, with the agreed x `target_m`. This neighbour
-/// does not know this relay's association (session) number yet.
+/// Returns a neighbour's first message, at `x_m`, with the agreed x `target_m`. The neighbour does not know the
+/// association (session) number of the relay under test yet.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,
@@ -48,7 +48,7 @@ fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     }
 }
 
-/// Guard of one relay under test, with the time of the test.
+/// Guard of one relay under test, and the time of the test.
 struct One {
     guard: Guard,
     now: Instant,
@@ -66,7 +66,7 @@ impl One {
         one
     }
 
-    /// Test helper: reports the x `x_m` of the relay to its guard, long after the guard's last setpoint.
+    /// Reports the x `x_m` to the guard, long after its last setpoint.
     fn is_at(&mut self, x_m: f32) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, at(x_m));
@@ -141,8 +141,8 @@ fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Checks rule 1: a relay stays beyond the fence (limit of x) of its upstream neighbour. This holds even if the
-/// downstream neighbour started too close to the relay.
+/// Checks rule 1: a relay stays beyond its upstream neighbour's fence (limit of x). This holds even if the downstream
+/// neighbour started too close to it.
 #[test]
 fn a_relay_between_two_fences_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
@@ -194,7 +194,7 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// Checks that a relay waits before it approaches the relays beyond a removed neighbour. It first has to receive one
+/// Checks that a relay does not approach the relays beyond a removed neighbour too early. It first has to receive one
 /// of them.
 #[test]
 fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
@@ -206,7 +206,7 @@ fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     assert_eq!(one.setpoint().to_bits(), 300.0_f32.to_bits());
     let reason = one.guard.hold_reason(Side::Upstream);
     assert_eq!(reason, Some(HoldReason::Lost));
-    // It moves away from them before it moves across the line.
+    // The relay moves away from them before it changes its lateral offset or altitude.
     one.guard.commit(Placement {
         y_m: 50.0,
         ..at(200.0)
@@ -263,22 +263,22 @@ fn a_relay_that_turns_stays_within_its_earlier_setpoints() {
         "it may be off the ground"
     );
     assert_eq!(after(9_000, &[], 60.0), (20.0, 60.0));
-    // It flies toward Tx at full speed, and is to turn.
+    // The relay flies toward Tx at full speed, and has to turn.
     assert_eq!(after(10_000, &[80.0], 50.0), (20.0, 80.0));
     assert_eq!(after(10_200, &[], 48.0), (20.0, 80.0));
     assert_eq!(after(13_900, &[90.0], 36.0), (20.0, 90.0));
-    // By now it has stopped and turned; setpoints on its way do not change that.
+    // By now the relay has stopped and turned. Setpoints on its way do not change that.
     assert_eq!(after(14_000, &[], 36.0), (36.0, 90.0));
     assert_eq!(after(14_200, &[95.0], 38.0), (38.0, 95.0));
     assert_eq!(after(21_000, &[], 95.0), (95.0, 95.0));
 }
 
-/// x of the setpoints of two neighbouring relays, m: relay 1 and relay 2. The tests compare them exactly.
+/// x of the setpoints of relay 1 and relay 2, m. The tests compare them exactly.
 #[derive(PartialEq, Debug)]
 struct Both(f32, f32);
 
-/// Two neighbouring guards that exchange messages about their fence (limit of x). Relay 1, the owner, is toward Tx,
-/// and relay 2, the follower, toward Rx.
+/// Guards of two neighbours that exchange fence messages. Relay 1, the owner of the fence, is toward Tx, and relay 2,
+/// the follower, toward Rx.
 struct Pair {
     owner: One,
     follower: One,
@@ -326,7 +326,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
         pair.owner.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Unheard)
     );
-    // Away from the expected position of the other one, which may be its real one.
+    // Away from the expected position of the neighbour, which may be right.
     pair.owner.guard.commit(at(50.0));
     pair.follower.guard.commit(at(400.0));
     assert_eq!(pair.setpoints(), Both(100.0, 300.0));
@@ -334,7 +334,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Checks rules 3, 4 and 6 for moves toward Rx. Relay 1 advances only as far as relay 2 has moved ahead.
+/// Checks rules 3, 4 and 6 for moves toward Rx. Relay 1 advances only as far as relay 2 has moved.
 #[test]
 fn the_owner_follows_the_follower() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
@@ -358,7 +358,7 @@ fn the_owner_follows_the_follower() {
     );
 }
 
-/// Checks rules 1 and 5 for moves toward Tx. Relay 1 moves first, then the fence (limit of x), and then relay 2.
+/// Checks rules 1 and 5 for moves toward Tx: first relay 1 moves, then the fence, then relay 2.
 #[test]
 fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -372,7 +372,7 @@ fn the_follower_follows_the_owner() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Checks rule 3: late messages, and messages with an older fence (limit of x), let no relay move.
+/// Checks rule 3: late messages, and messages with an older fence, let no relay move.
 #[test]
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -405,8 +405,9 @@ fn late_messages_grant_nothing() {
     );
 }
 
-/// Checks that an old position report lets no neighbour move into the space that a relay will leave. The report is
-/// older than the setpoint, or too early to show its effect.
+/// Checks that an old position report lets no neighbour move into the space that a relay will leave.
+///
+/// The report is older than the setpoint, or too early to show its effect.
 #[test]
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -454,7 +455,7 @@ fn relays_in_the_wrong_order_stay() {
     let mut pair = Pair::new([200.0, 100.0], [150.0, 300.0]);
     pair.follower.guard.commit(at(300.0));
     pair.talk();
-    // Away from the expected position of the other one, which is its real one.
+    // Away from the expected position of the neighbour, which is right.
     pair.owner.guard.commit(at(250.0));
     pair.follower.guard.commit(at(140.0));
     pair.talk();
@@ -465,9 +466,10 @@ fn relays_in_the_wrong_order_stay() {
     );
 }
 
-/// Checks that a restarted relay is recognised, and its late old messages are ignored. The restarted relay does not
-/// know the fence (limit of x) that it announced. Its neighbour respects this fence until the two have exchanged
-/// messages.
+/// Checks that a restarted relay is recognised, and its late old messages are ignored.
+///
+/// The restarted relay does not know the fence (limit of x) that it announced. Its neighbour respects this fence until
+/// the two have exchanged messages.
 #[test]
 fn a_restart_is_distinguished_from_late_messages() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -475,7 +477,7 @@ fn a_restart_is_distinguished_from_late_messages() {
     let old = pair.owner.sent(Side::Downstream);
     let told = pair.follower.sent(Side::Upstream);
     pair.owner = One::new([None, Some(2)], 100.0, 280.0);
-    // Another seed, as required.
+    // A restart needs another seed.
     pair.owner.guard = {
         let mut guard = Guard::new(config(), [None, Some(2)], 8, Instant::ZERO);
         guard.commit(at(280.0));
@@ -496,7 +498,7 @@ fn a_restart_is_distinguished_from_late_messages() {
         pair.follower.receive(Side::Upstream, 1, old);
     }
     assert_eq!(pair.follower.setpoint().to_bits(), 295.0_f32.to_bits());
-    // Three in a row look like another restart, but grant nothing either.
+    // Three old messages in a row look like another restart, but grant nothing either.
     pair.follower.receive(Side::Upstream, 1, old);
     assert!(pair.follower.setpoint() >= 295.0);
     pair.talk();
@@ -509,8 +511,8 @@ fn a_restart_is_distinguished_from_late_messages() {
 
 /// Checks that a relay out of order with its downstream neighbour keeps the upstream one in place.
 ///
-/// Its message requests a halt from the upstream neighbour. Usually the x in a message permits a move. A flag in this
-/// message states that the x permits no move.
+/// Its message requests a halt of the upstream neighbour. Usually the x in a message permits a move, but a flag in this
+/// message states that it does not.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -539,7 +541,7 @@ fn a_relay_out_of_order_grants_nothing() {
         one.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Order)
     );
-    // That message grants nothing to the neighbour upstream.
+    // That message grants nothing to the upstream neighbour.
     let mut owner = One::new([None, Some(2)], 50.0, 60.0);
     let association = owner.sent(Side::Downstream).association;
     let told = Fence {
@@ -556,7 +558,7 @@ fn a_relay_out_of_order_grants_nothing() {
     );
     beyond.x_m = 120.0;
     one.receive(Side::Downstream, 3, beyond);
-    // Now its x counts; but it sends no fence downstream before it has received one from upstream.
+    // Now the x of the relay counts. But it sends no fence downstream before it has received one from upstream.
     assert_eq!(one.sent(Side::Upstream).flags & Fence::UNPLACED, 0);
     assert_eq!(one.sent(Side::Upstream).x_m.to_bits(), 100.0_f32.to_bits());
     assert_eq!(one.sent(Side::Downstream).number, 0);
@@ -574,7 +576,7 @@ fn a_relay_out_of_order_grants_nothing() {
 
 /// Checks that a relay counts as held up after five reminders without a change of its setpoint.
 ///
-/// A setpoint with the same value does not restart the count; another setpoint does.
+/// Only a different setpoint restarts the count.
 #[test]
 fn a_setpoint_that_stays_for_five_reminders_is_held_up() {
     let mut own = Own::new(config(), 1, Instant::ZERO);

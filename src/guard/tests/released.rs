@@ -1,4 +1,4 @@
-//! Tests of a relay that is not flown to its setpoints.
+//! Tests of a relay that does not fly to setpoints.
 
 extern crate std;
 
@@ -10,7 +10,7 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::Instant;
 
-/// Three relays in a row, 100 m apart. The tests put the middle drone under manual control of its pilot.
+/// Three relays in a row, 100 m apart. In the tests a pilot takes control of the middle one.
 struct Row {
     all: [One; 3],
 }
@@ -45,8 +45,7 @@ impl Row {
         }
     }
 
-    /// Passes the next message of relay `k` to its neighbour and returns it; `None` if none is pending. `k` is 0 to
-    /// 2.
+    /// Passes the next message of relay `k` (0 to 2) to its neighbour, and returns it. `None` if none is pending.
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;
@@ -105,7 +104,7 @@ fn no_relay_comes_nearer_to_one_in_manual_flight() {
         );
     }
     assert_eq!(row.all[1].guard.hold_reason(Side::Upstream), None);
-    // Both may move after an operator has checked.
+    // Both may move after an operator has reported the drone as gone.
     row.all[0].guard.commit(at(180.0));
     row.all[0].guard.forget(Side::Downstream, false);
     assert_eq!(row.setpoint(0), Some(180.0));
@@ -126,14 +125,14 @@ fn no_relay_flies_through_a_drone_in_manual_flight() {
         let reason = row.all[0].guard.hold_reason(Side::Downstream);
         let expected = (expected_m > 20.0).then_some(HoldReason::NotFlown);
         assert_eq!(reason, expected);
-        // The drone is gone again.
+        // The drone is no longer in the way.
         row.all[1].guard.position(now, at(200.0));
         row.talk();
         assert_eq!(row.setpoint(0), Some(20.0));
     }
 }
 
-/// Checks that a moving relay stops before a drone in its way, and stays despite position noise.
+/// Checks that a moving relay stops before a drone in its way, and stays there despite position noise.
 #[test]
 fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     let mut row = Row::new();
@@ -152,7 +151,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. "Beside" means
+/// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. Beside means
 /// closer than the separation along x.
 #[test]
 fn no_relay_moves_across_toward_a_drone_beside_it() {
@@ -174,8 +173,8 @@ fn no_relay_moves_across_toward_a_drone_beside_it() {
     }
 }
 
-/// Checks that a neighbour counts as lost if it became silent right after its start. It had sent only its position,
-/// and had no association (session) yet.
+/// Checks that a neighbour that became silent right after its start counts as lost. It had sent only its position, and
+/// had no association (session) yet.
 #[test]
 fn a_relay_that_fell_silent_after_its_start_is_lost() {
     let mut row = Row::new();
@@ -215,9 +214,10 @@ fn a_late_position_of_a_drone_flown_again_is_no_obstacle() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// Checks that the hold reason states that a restarted neighbour does not fly to setpoints. The neighbour's companion
-/// computer restarted, and its pilot has not engaged setpoint control again. The limit of x of the neighbour's old
-/// association (session) still holds.
+/// Checks that the hold reason states that a restarted neighbour does not fly to setpoints.
+///
+/// The neighbour's companion computer restarted, and its pilot has not engaged setpoint control again. The limit of x
+/// of the neighbour's old association (session) still holds.
 #[test]
 fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     let mut row = Row::new();
@@ -235,8 +235,8 @@ fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// Checks that a relay reports a silent neighbour in setpoint control that makes no room. The report comes after five
-/// reminders (seconds), and not while the relay itself moves.
+/// Checks that a relay reports a neighbour in setpoint control that makes no room. It reports after five reminders
+/// (seconds), and not while it moves.
 #[test]
 fn a_relay_that_stands_for_long_reports_pending() {
     let mut row = Row::new();
@@ -284,8 +284,8 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// Checks that the notice of a relay that leaves its association (session) is repeated. The repetition ends when the
-/// neighbour has started a new association. It does not end because the pilot gives the drone back.
+/// Checks that the notice of leaving an association (session) is repeated. The repetition ends when the neighbour has
+/// started a new one, but not when the pilot gives the drone back.
 #[test]
 fn lost_messages_are_repeated() {
     let mut row = Row::new();
@@ -310,8 +310,9 @@ fn lost_messages_are_repeated() {
     assert!(row.all.iter().all(|one| one.guard.has_arrived()));
 }
 
-/// Checks that late messages change nothing after a pilot has taken a drone over or given it back. Its neighbours
-/// take neither an old fence message for the end of the manual control, nor an old leave notice for its beginning.
+/// Checks that late messages change nothing after a pilot has taken a drone over or given it back.
+///
+/// An old fence message does not end the manual control for the neighbours, nor does an old leave notice begin it.
 #[test]
 fn late_messages_do_not_change_who_is_flown() {
     let mut row = Row::new();
@@ -355,7 +356,7 @@ fn two_neighbours_are_released_and_flown_again() {
     let now = row.all[2].now;
     row.all[2].guard.control(now, false);
     row.talk();
-    // Each sends its position now and then, without a reply.
+    // Each sends its position now and then, without waiting for a reply.
     assert!(row.all[1].guard.poll().is_none() && row.all[2].guard.poll().is_none());
     row.give();
     row.all[1].is_at(200.0);

@@ -1,4 +1,4 @@
-//! Claims to this relay's node number, which another node may use too.
+//! Claims to this relay's node number, which another node possibly uses too.
 
 use super::Node;
 use crate::event::{Event, NodeEvent};
@@ -14,7 +14,7 @@ impl Node {
         let settings = self.member.settings;
         let shown = match sender {
             Sender::Itself => false,
-            // Without signatures the frame may be this relay's own, which only a claim can tell.
+            // Without signatures the frame may be this relay's own. Only a claim can show that.
             Sender::Unknown => settings.auth.is_some(),
             Sender::Rival(rival) => rival.is_current,
         };
@@ -28,12 +28,13 @@ impl Node {
             if let Sender::Rival(rival) = sender
                 && rival.newer_epoch
             {
-                // The other node may be this relay itself, before its epoch went back.
+                // The sender may be this relay itself, before its epoch went back.
                 self.raise_node_event(NodeEvent::Epoch, Side::Upstream, node);
             }
         }
         let placed = self.setpoint().is_some();
-        // The relay keeps its claim to the position during a view change, which a duplicate may have requested.
+        // A pending lease counts, too. The relay keeps its position during a view change, which a duplicate may have
+        // requested.
         let lease = &self.layers.lease;
         let leased = lease.is_pending() || lease.until().is_some_and(|until| until > now);
         let has_lease = placed && leased;
@@ -48,11 +49,11 @@ impl Node {
         }
     }
 
-    /// Handles a claim message of node `from`, by which nodes with the same node number detect each other. Returns
+    /// Handles a claim message of node `from`. Nodes with the same node number detect each other by claims. Returns
     /// false if frames are signed, because signed handshakes then take the place of claims.
     ///
-    /// If node `from` claims its own number, its claim is sent back to it as an echo. An echo that arrives here shows
-    /// a claim to this relay's number, and is compared with this relay's own claim.
+    /// If node `from` claims its own number, its claim is sent back to it as an echo. An echo that arrives here
+    /// contains another node's claim to this relay's number. It is compared with this relay's claim.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -86,11 +87,10 @@ impl Node {
         Some((side, to, Message::Claim(claim)))
     }
 
-    /// Returns the node to which a claim is due, and marks the claim as sent; `None` if no claim is due.
+    /// Returns the node to which a claim must be sent, and marks the claim as sent. `None` if no claim is due.
     ///
-    /// A claim is the message by which two nodes with the same node number detect each other. Claims go to the two
-    /// neighbours in turn. A relay without neighbours on a shared channel addresses them to its own number, so that
-    /// another node with that number receives them.
+    /// The two neighbours receive claims alternately. A relay without neighbours on a shared channel sends them to its
+    /// own number, so that another node with that number receives them.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;
@@ -102,9 +102,9 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the relay's new claim number if all authentication sessions must be restarted; else `None`. By the
-    /// claim number two nodes with the same node number decide which of them is active. The new sessions count their
-    /// nonces from this number.
+    /// Returns the new claim number if all authentication sessions must be restarted; otherwise `None`.
+    ///
+    /// The new sessions count their nonces from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
@@ -116,7 +116,7 @@ impl Node {
     /// Returns the number of the lease renewal that requires a handshake after `message`.
     ///
     /// `None` if `message` requires no handshake. On a shared channel one message of each lease renewal requires a
-    /// handshake. From the handshake another node with the same number detects this relay, even if the chain sends
+    /// handshake. From this handshake another node with the same number detects this relay, even if the chain sends
     /// nothing else.
     pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {
         let number = match message {
@@ -146,7 +146,7 @@ impl Node {
     }
 
     /// Makes this passive relay active again, as after a restart. It leaves its view, because the other node with its
-    /// number has possibly changed this view in the meantime.
+    /// number has possibly changed this view.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

@@ -1,4 +1,4 @@
-//! Pending hellos, and received ones, by which the neighbours are selected.
+//! Pending hellos, received hellos, and the selection of the neighbours.
 
 use super::Node;
 use crate::event::NodeEvent;
@@ -11,8 +11,10 @@ use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 
-/// Mission fields of a hello: the newest mission that the relay has stored, and three flags. The flags state if the
-/// mission is active at this relay, if all relays of the view are known to have it active, and if it was refused.
+/// Mission fields of a hello: newest stored mission, and three flags.
+///
+/// The flags state whether the mission is active at this relay, whether it is known to be active at all relays of the
+/// view, and whether it was refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -21,7 +23,7 @@ struct MissionState {
 }
 
 impl Node {
-    /// Schedules a hello to node `to` at `side`; if `ask` is true it requests a hello in return.
+    /// Schedules a hello to node `to` at `side`. If `ask` is true, it requests a hello in return.
     #[inline(never)] // called from many places
     pub(super) fn schedule_hello(&mut self, side: Side, to: u16, ask: bool) {
         let distance = to.abs_diff(self.member.node);
@@ -31,7 +33,7 @@ impl Node {
             .schedule_hello(distance, ask);
     }
 
-    /// Returns the next pending hello with its side and its destination node; `None` if none is pending.
+    /// Returns the next pending hello with its side and destination node; `None` if none is pending.
     pub(super) fn next_hello(&mut self, now: Instant) -> Option<(Side, u16, Hello)> {
         let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {
@@ -87,7 +89,7 @@ impl Node {
         }
     }
 
-    /// Returns the mission fields of a hello. They describe the stored mission, or a newer mission that was refused.
+    /// Returns the mission fields of a hello, for the stored mission or for a newer one that was refused.
     fn mission_state(&self) -> MissionState {
         let (active, latest) = (self.member.active, self.layers.update.latest());
         if let Some(refused) = self.layers.update.refused_mission(active) {
@@ -108,12 +110,11 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`. Node `other`
-    /// is at `side`, and its neighbour must be on the opposite side of this relay.
+    /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`.
     ///
-    /// In addition one of three conditions must hold. Either this relay and the neighbour of `other` receive each
-    /// other. Or this relay is linked to a nearer node, and both are inserted together. Or this relay's link crosses
-    /// the link of `other`.
+    /// Node `other` is at `side`, and its neighbour must be on the opposite side of this relay. One of three conditions
+    /// must also hold. Either this relay and that neighbour receive each other. Or this relay is linked to a nearer
+    /// node, and both are inserted together. Or this relay's link crosses the link of `other`.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -134,10 +135,10 @@ impl Node {
     }
 
     /// Returns the number of relays that a neighbour reaches through this relay. These are this relay, and the relays
-    /// on its other side, `far`.
+    /// on the side `far`.
     fn relays_through(&self, far: Side) -> u16 {
-        // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
-        // the old view, although no neighbour selects it.
+        // A relay that has just started belongs to no part of the chain. A relay that was left out still has its count
+        // from the old view, although no neighbour selects it.
         if self.layers.round.is_fresh() || !self.layers.neighbours.at(far).is_mutual() {
             1
         } else {
@@ -145,7 +146,7 @@ impl Node {
         }
     }
 
-    /// Returns the number of relays connected to this relay on `side`, by the last view proposal.
+    /// Returns the number of relays on `side`, according to the last view proposal.
     pub(super) fn relays_on(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;
@@ -164,8 +165,7 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a hello from node `from` at `side`. Node `from` and this relay have loaded the same mission before
-    /// flight.
+    /// Handles a hello from node `from` at `side`. The node has loaded the same mission before flight.
     pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let known = self.layers.view.latest_view();
@@ -198,13 +198,14 @@ impl Node {
             self.layers.neighbours.at_mut(side).latest_mission = Some(hello.latest_mission);
             if self.searches() {
                 let two_way = hello.is_heard(from, own);
-                // A few lost frames do not end a link; the neighbour's silence has its own timer.
+                // A few lost frames do not end a link. The neighbour's silence has its own timer.
                 let linked = self.layers.neighbours.at(side).is_mutual();
                 let mutual = hello.neighbour == own && (two_way || linked);
                 self.on_mutual(now, side, mutual);
             }
             let waits = self.layers.view.outstanding().is_some();
-            // A neighbour with a newer mission joins no view without it, so a view is requested when this relay has that mission.
+            // A neighbour with a newer mission joins only a view with that mission. So this relay requests a view once
+            // it has the mission.
             let newer = accepts_uploads(&self.member)
                 && !hello.refused
                 && hello.latest_mission > self.layers.update.latest();
@@ -224,8 +225,8 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records if node `from` receives this relay: yes if `heard` is true. Reports the node to the firmware if it
-    /// repeatedly does not receive this relay.
+    /// Records whether node `from` receives this relay (`heard`). Reports the node to the firmware if it repeatedly
+    /// does not.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -238,8 +239,8 @@ impl Node {
         }
     }
 
-    /// Selects node `from` as the neighbour on `side` if the side has none, or if the node is better. A node is
-    /// better if it is nearer, or if it leads to more relays. A node that does not receive this relay is not
+    /// Selects node `from` as the neighbour on `side` if the side has none, or if the node is better. A node is better
+    /// if it is nearer, or if more relays can be reached through it. A node that does not receive this relay is not
     /// selected.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
@@ -252,17 +253,18 @@ impl Node {
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
         neighbour.record_unselected(now, settings);
-        // The candidate prefers this relay to a neighbour that is farther away.
+        // The candidate's neighbour is farther away than this relay, so the candidate would prefer this relay.
         let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
         let before = neighbour.node();
-        // The node beyond a neighbour that is ordered to leave.
+        // The candidate is the node beyond a neighbour that is ordered to leave.
         let passes = leaver != 0 && leaver == before && [own, leaver].contains(&hello.neighbour);
         let taken = hello.neighbour != own && hello.neighbour != 0 && !farther && !passes;
         if taken || !hello.is_heard(from, own) {
             return;
         }
         let pairs = hello.neighbour == own;
-        // The candidate reaches all relays beyond the current neighbour except that one: they have a link past it.
+        // The candidate reaches all relays beyond the current neighbour except one. So these relays have a link past
+        // that one.
         let all_but_one = hello.behind > 1 && hello.behind.checked_add(1) == Some(there);
         let candidate = Candidate {
             node: from,
@@ -293,8 +295,8 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay: yes if `mutual` is true. If this has just become
-    /// true, retransmits unanswered messages, because the neighbour can answer now.
+    /// Records whether the neighbour at `side` has selected this relay (`mutual`). If it has just done so, unanswered
+    /// messages are retransmitted.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

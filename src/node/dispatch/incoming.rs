@@ -1,4 +1,4 @@
-//! Received messages: which are accepted, on which side their sender is, and which layer handles each.
+//! Received messages: which are accepted, from which side they come, and which layer handles them.
 
 use super::Node;
 use crate::event::NodeEvent;
@@ -14,8 +14,9 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`. Returns false if such a message is not allowed from node
-    /// `from`. Work: at most the computation of this relay's positions for 16 target SIRs.
+    /// Handles an intact message from node `from` at `side`. Returns false if this node must not send such a message.
+    ///
+    /// Work: at most the computation of this relay's positions for 16 target SIRs.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,
@@ -34,7 +35,7 @@ impl Node {
             return self.on_ground(now, side, from, message);
         }
         if let Message::Level { .. } = message {
-            // Only the ground station sends levels.
+            // Only the ground station sends this message.
             return false;
         }
         if let Message::Watch { .. } | Message::Report(_) = message {
@@ -59,7 +60,7 @@ impl Node {
             && !taken
             && accepts_uploads(&self.member)
         {
-            // The sender uses this relay as its neighbour: a hello alone would only trigger the same offer again.
+            // The sender uses this relay as its neighbour. A hello alone would only trigger the same offer again.
             if self.is_of_mission(now, side, from, upload.base()) {
                 self.on_offer(now, side, from, upload, *offer_number);
             }
@@ -70,7 +71,7 @@ impl Node {
             return false;
         }
         if self.searches() {
-            // Such a message is sent only to a neighbour, so the sender uses this relay as one.
+            // A node sends such a message only to its neighbour, so the sender uses this relay as its neighbour.
             self.on_mutual(now, side, true);
         }
         if !self.is_of_this_view(now, side, from, message) {
@@ -81,11 +82,11 @@ impl Node {
         true
     }
 
-    /// Returns true if `message` belongs to the current mission and view. The view is compared only for kinds of
-    /// messages that depend on it.
+    /// Returns true if `message` belongs to the current mission and view. The view is compared only for messages that
+    /// depend on it.
     ///
-    /// Any other message is counted and answered by a hello. A pass message of another view also makes this relay
-    /// request a new view.
+    /// Any other message is counted and answered by a hello. If the message belongs to an agreement of another view,
+    /// this relay also requests a new view.
     fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.digest() else {
             return true;
@@ -116,8 +117,8 @@ impl Node {
         known
     }
 
-    /// Returns true if node `from` uses the same x axis as this relay. The axis is the line from Tx to Rx, and
-    /// `digest` in the node's message identifies it. A message with another axis is counted as rejected.
+    /// Returns true if node `from` uses the same x axis, the line from Tx to Rx. `digest` in the node's message
+    /// identifies the axis. A message with another axis is counted as rejected.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.layers.update.line_digest(&self.member);
         if !same && self.layers.neighbours.at(side).latest_mission.is_some() {
@@ -186,7 +187,7 @@ impl Node {
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
         let effects = match message {
-            // The relays that it leaves out may link at any moment; it is retransmitted.
+            // The relays that it leaves out may be linked at any moment. The proposal will be retransmitted.
             Message::Proposal(proposal) if layers.is_premature(now, side, proposal) => {
                 Effects::STALE
             }
@@ -194,11 +195,11 @@ impl Node {
             Message::Busy { number: sweep } if layers.view.on_busy(&context, *sweep) => {
                 Effects::NONE
             }
-            // No pass continues during a view change.
+            // No agreement on positions continues during a view change.
             _ if layers.view.outstanding().is_some() => Effects::STALE,
             _ => {
                 if message.belongs_to_view() && message.is_onward() {
-                    // A pass or a renewal shows that all members have accepted the view.
+                    // An agreement or a lease renewal shows that all members have accepted the view.
                     layers.view.commit(self.member.view);
                     layers.lease.confirm_view();
                 }
@@ -215,7 +216,9 @@ impl Node {
         }
     }
 
-    /// Records that the neighbour at `side` was alive at time `at`. The neighbour has replied to a message that was sent at that time.
+    /// Records that the neighbour at `side` was alive at time `at`.
+    ///
+    /// The neighbour has replied to a message that was sent at that time.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {
@@ -226,8 +229,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first` is true),
-    /// messages that the node could not verify are repeated.
+    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first`), messages
+    /// that the node could not verify are repeated.
     pub(crate) fn on_authentic(&mut self, now: Instant, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
@@ -247,8 +250,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake of node `from` at `side` that does not prove that the node receives this relay. The node
-    /// signs with the right key, but counts as not receiving this relay.
+    /// Handles a valid handshake of node `from` at `side`. The node counts as not receiving this relay, because the
+    /// handshake does not prove it.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {
@@ -256,8 +259,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. If several
-    /// such handshakes are received in a row, the node is reported to the firmware.
+    /// Handles a handshake of node `from` at `side` that is signed with another key. After several in a row the node is
+    /// reported to the firmware.
     pub(crate) fn on_forged(&mut self, now: Instant, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         let before = self.refusals(now);
@@ -282,7 +285,7 @@ impl Node {
 }
 
 impl Node {
-    /// Returns the side toward the last relay, to which messages from the leader are forwarded.
+    /// Returns the side toward the last relay.
     pub(super) const fn onward(&self) -> Side {
         Side::onward(self.member.mission.heading())
     }
@@ -291,8 +294,8 @@ impl Node {
         Side::back(self.member.mission.heading())
     }
 
-    /// Returns the side of node `sender`. `None` unless the node is a neighbour, a possible neighbour, or a ground
-    /// station that is permitted to upload missions.
+    /// Returns the side of node `sender`. `None` unless it is a neighbour, a possible neighbour, or a ground station
+    /// that may upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
@@ -309,8 +312,7 @@ impl Node {
         })
     }
 
-    /// Returns the side of `node` if it is Tx or Rx, and this relay accepts its messages; else `None`. Tx and Rx are
-    /// the ground stations.
+    /// Returns the side of `node` if it is a ground station that this relay listens to; otherwise `None`.
     pub(super) fn ground_side(&self, node: u16) -> Option<Side> {
         let (own, all) = (self.member.node, self.member.all);
         let most = match self.member.settings.wiring {
@@ -325,13 +327,13 @@ impl Node {
         }
     }
 
-    /// Returns true on a shared channel. There a relay receives many nodes, and searches for its neighbours.
+    /// Returns true on a shared channel, where a relay receives many nodes and searches for its neighbours.
     pub(super) fn searches(&self) -> bool {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` received at port `through`. If this node number is already received at the
-    /// other port, two nodes use the same number. This is reported to the firmware.
+    /// Handles a frame of node `from` received at port `through`. If the node is also received at the other port, two
+    /// nodes use the same number, which is reported to the firmware.
     pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

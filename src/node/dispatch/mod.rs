@@ -1,22 +1,22 @@
 //! Dispatch of messages, timers and effects to the layers.
 //!
-//! [`Node`] is one struct; each file has its methods for one purpose, and this one the state, the layers, how the effects of one layer
-//! reach the others, and the next message, in order of urgency.
+//! [`Node`] is one struct. Each file has its methods for one purpose. This file has the state and the layers. It
+//! applies the effects of one layer to the others, and selects the next message by urgency.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | `incoming` | received messages: checks, side of the sender, choice of the layer; results of handshakes |
 //! | `timers` | expired timers of all layers |
-//! | `adoption` | adoption of a decided view and its mission; the setpoint, and the reports of the drone that it depends on |
+//! | `adoption` | adoption of a decided view and its mission; the setpoint, and the drone's reports that affect it |
 //! | `claims` | claims to this node's number |
 //! | `departure` | relays that leave the chain, or wait outside of it |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
 //! | `offers` | newer missions, exchanged with neighbours and with the ground |
-//! | `telemetry` | reports of this relay's state, and those that it hands on |
+//! | `telemetry` | reports of this relay's state, and forwarded reports of other relays |
 //!
-//! A relay without a quorum drops its links after a while, and searches for neighbours again. Otherwise two interleaved parts,
-//! such as 1 - 3 - 5 and 2 - 4, or a part that has not selected the node toward the rest of the chain, would keep their links
-//! forever. A part without a quorum loses nothing by it.
+//! A relay without a quorum drops its links after a while, and searches for neighbours again. Otherwise two interleaved
+//! parts, such as 1 - 3 - 5 and 2 - 4, would keep their links forever. So would a part that has not selected the node
+//! toward the rest of the chain. A part without a quorum loses nothing by dropping its links.
 
 use crate::event::{Event, NodeEvent, Pending};
 use crate::features::SENSING;
@@ -56,7 +56,7 @@ mod timers;
 #[cfg(test)]
 mod tests;
 
-/// Claim to a node number, to be sent back to its sender as an echo: side, destination node, and claim.
+/// Claim to a node number that is sent back to its sender: side, destination node, and claim.
 pub(crate) type Echo = (Side, u16, Claim);
 
 #[derive(Clone, Debug)]
@@ -67,11 +67,11 @@ pub(crate) struct Node {
     pub(crate) reporting: Reporting,
     pub(super) duplicate: IndexClaims,
     pub(super) no_quorum_timer: NoQuorumTimer,
-    /// Received claim to a node number that must be sent back to its sender as an echo. `None` if there is none.
+    /// Received claim that must be sent back to its sender as an echo; `None` if there is none.
     pub(super) echo: Option<Echo>,
-    /// Side to which this relay sends the next claim to its node number.
+    /// Side to which this relay sends its next claim.
     pub(super) claim_side: Side,
-    /// Votes on views (chain memberships) that the firmware has confirmed as stored.
+    /// Votes on views that the firmware has confirmed as stored.
     persisted: ViewRecord,
     pub(super) telemetry: Telemetry,
 }
@@ -81,11 +81,9 @@ fn seed_of(identity: Identity, seed: u32) -> u32 {
 }
 
 impl Node {
-    /// Creates a relay with valid `identity` and `settings`. The relay does nothing until [`begin`](Self::begin) is
-    /// called.
+    /// Creates a relay with valid `identity` and `settings`. It does nothing until [`begin`](Self::begin) is called.
     ///
-    /// The value consists of plain numbers only, so that the compiler can write it in place, without a copy on the
-    /// stack.
+    /// The value has only plain numbers, so that the compiler can write it in place, without a copy on the stack.
     pub(crate) fn new(
         mission: &Mission,
         identity: Identity,
@@ -240,7 +238,7 @@ impl Node {
         self.layers.lease.until()
     }
 
-    /// Returns the begin and end of this relay's time slots, as fractions of the frame. `None` without a valid
+    /// Returns the start and end of this relay's time slots, as fractions of the frame. `None` without a valid
     /// agreement, and for equal slots.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         let void = self.layers.lease.has_lapsed() || self.layers.view.has_no_quorum();
@@ -261,8 +259,7 @@ impl Node {
         &self.member
     }
 
-    /// Returns the positions of Tx and Rx if the active mission states them. `None` if the configured positions
-    /// apply.
+    /// Returns the Tx and Rx positions of the active mission; `None` if the configured positions apply.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.layers.update.sites()
     }
@@ -283,7 +280,7 @@ impl Node {
         &mut self.telemetry.stats
     }
 
-    /// Returns the current votes on views (acceptor state) if the firmware has not stored them yet. Else `None`.
+    /// Returns the votes on views if the firmware has not stored them yet; otherwise `None`.
     pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
         let record = self.view_record();
         (record != self.persisted).then_some(record)
@@ -293,12 +290,12 @@ impl Node {
         self.layers.view.record(self.member.digest)
     }
 
-    /// Records that the firmware has stored `record`, the votes on views.
+    /// Records that the firmware has stored the votes in `record`.
     pub(crate) const fn persisted(&mut self, record: &ViewRecord) {
         self.persisted = *record;
     }
 
-    /// Restores the stored votes on views (acceptor state) after a start.
+    /// Restores the stored votes on views after a start.
     pub(crate) fn resume_view(
         &mut self,
         now: Instant,
@@ -313,7 +310,7 @@ impl Node {
         Ok(())
     }
 
-    /// Handles a measurement from the firmware; counts it if it is rejected.
+    /// Handles a measurement from the firmware. A rejected measurement is counted.
     pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
         if !self.layers.round.handle_sample(now, &self.member, sample) {
             bump(&mut self.telemetry.stats.samples_rejected);
@@ -322,7 +319,7 @@ impl Node {
         }
     }
 
-    /// Restarts the search for the best target SIR. Has an effect only at the leader, and not during a view change.
+    /// Restarts the search for the best target SIR. Has an effect only at the leader and outside of a view change.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
         let is_in = !self.is_passive() && !self.layers.leaving.is_outside();
@@ -346,8 +343,8 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Returns the state that a protocol layer receives as an argument. The state borrows only `member`, so that the
-    /// layers can be borrowed mutably at the same time.
+    /// Returns the state that a protocol layer receives as an argument. It borrows only `member`, so that the layers
+    /// can be borrowed mutably at the same time.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {
@@ -359,16 +356,14 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` comes too early. Such a proposal would leave out relays that are
-    /// about to be linked. A proposal counts as early if it has visited fewer relays than the previous proposal, and
-    /// its sender has only just become the neighbour.
+    /// Returns true if a view proposal from `side` would leave out relays that are about to be linked. This is assumed
+    /// if it has visited fewer relays than the previous proposal, and its sender has only just become the neighbour.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
-    /// Schedules retransmissions of all messages that await a reply. Called when the next relay is reachable after a
-    /// loss.
+    /// Schedules retransmissions of all messages that await a reply. Called when the next relay is reachable again.
     pub(super) fn resend(&mut self) {
         self.view.resend();
         self.round.resend();
@@ -380,22 +375,19 @@ impl Layers {
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True if the end of the lease was reported to the firmware since the last accepted view. The end is reported
-    /// once per view (agreed members of the chain).
+    /// True if the end of the lease was reported to the firmware in this view. It is reported once per view.
     pub(super) lapse_reported: bool,
-    /// True if a missing quorum was reported to the firmware since the last accepted view. The missing quorum is
-    /// reported once per view (agreed members of the chain).
+    /// True if a missing quorum was reported to the firmware in this view. It is reported once per view.
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time without a quorum after which relays first drop their links, in units of `dead_after`. These are the links to
-/// their neighbours.
+/// Time without a quorum after which relays first drop their links, in units of `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time until relays without a quorum drop their links once more, in units of `dead_after`.
+/// Time between later drops of the links while there is no quorum, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
-/// Timer after which relays without a quorum drop the links to their neighbours and search for others.
+/// Timer after which a relay without a quorum drops its links and searches for other neighbours.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NoQuorumTimer {
     /// Expiry of the timer; `None` while there is a quorum.
@@ -415,7 +407,7 @@ impl NoQuorumTimer {
 }
 
 impl Node {
-    /// Starts the timer for dropping links if there is no quorum on a shared channel. Otherwise stops this timer.
+    /// Starts the no-quorum timer if there is no quorum on a shared channel. Otherwise stops it.
     pub(super) fn update_no_quorum_timer(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
             self.no_quorum_timer = NoQuorumTimer::NONE;
@@ -424,7 +416,7 @@ impl Node {
         }
     }
 
-    /// Returns how long links to neighbours are kept while there is no quorum.
+    /// Returns the time after which links are dropped while there is no quorum.
     fn link_retention(&self) -> Duration {
         let settings = &self.member.settings;
         let times = if self.no_quorum_timer.has_expired {
@@ -490,8 +482,9 @@ impl Node {
         Some((side, to, Message::Fence { line_digest, fence }))
     }
 
-    /// Returns the next pending message of a view change, a lease renewal or an agreement on positions. The result
-    /// includes the side and the destination node. `None` if no such message is pending.
+    /// Returns the next message of a view change, a lease renewal or an agreement on positions.
+    ///
+    /// The result includes its side and destination node. `None` if no message is pending.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {
@@ -503,7 +496,7 @@ impl Node {
         let (next, before) = (peer(onward), peer(back));
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
-        // A proposal waits while there is no next relay.
+        // A proposal is not sent while there is no next relay.
         if let Some((to, _)) = next
             && let Some(message) = layers.view.poll_onward(&context, to)
         {

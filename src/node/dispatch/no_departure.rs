@@ -1,6 +1,6 @@
-//! Departures in a build without the feature `departures`.
+//! Relays that leave the chain, in a build without the feature `departures`.
 //!
-//! This relay hands on the requests and orders of the others, and selects no node outside of the chain.
+//! This relay forwards the requests and orders of other relays, and selects no node outside of the chain.
 
 #![expect(
     clippy::unused_self,
@@ -77,8 +77,9 @@ impl Node {
 
     pub(super) const fn follow_orders(&self, _: Instant) {}
 
-    /// Returns true if node `from` is outside of the chain, and must not be selected. If the node is the neighbour,
-    /// its hello ends the link, like any hello of a neighbour that has not selected this relay.
+    /// Returns true if node `from` is outside of the chain and must not be selected.
+    ///
+    /// If it is the neighbour, its hello ends the link, like any hello of a neighbour that has not selected this relay.
     pub(super) fn on_departure(&self, _: Instant, side: Side, from: u16, hello: &Hello) -> bool {
         hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
     }

@@ -1,4 +1,4 @@
-//! Newer missions, exchanged with neighbours and the ground, and measurements from the ground.
+//! Exchange of newer missions with neighbours and the ground, and measurements from the ground.
 
 use super::Node;
 use crate::event::Event;
@@ -12,8 +12,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// Handles a message from the ground station at `side`, Tx or Rx. Returns false if this kind of message is not
-    /// allowed from a ground station.
+    /// Handles a message from the ground station at `side` (Tx or Rx). Returns false if a ground station must not send
+    /// such a message.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,
@@ -57,8 +57,9 @@ impl Node {
         true
     }
 
-    /// Returns the next message for the ground station at `side`, and the station's node number. The message is a
-    /// hello, or the uploaded mission that the station has requested; `None` if neither is pending.
+    /// Returns the next message for the ground station at `side`, with the station's node number.
+    ///
+    /// The message is a hello or the requested upload; `None` if neither is pending.
     pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
         let to = match side {
             Side::Upstream => 0,
@@ -83,8 +84,8 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if an offer with the number `offer_number` answers a recent hello of this relay. Each hello has a
-    /// number, and the offer repeats this number. An offer with another number is counted as stale.
+    /// Returns true if `offer_number` is the number of a recent hello of this relay. An offer must repeat such a
+    /// number. Any other offer is counted as stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers
@@ -96,12 +97,11 @@ impl Node {
         asked
     }
 
-    /// Handles an offer of a mission from node `from` at `side`. Node `from` and this relay have loaded the same
-    /// mission before flight.
+    /// Handles a mission offer from node `from` at `side`. The node has loaded the same mission before flight.
     ///
-    /// An offer that repeats no recent number is answered by a hello; the next offer can repeat the number of this
+    /// An offer that repeats no recent number is answered by a hello. The next offer can repeat the number of this
     /// hello. After any other offer a hello is sent only if this relay has stored or refused the mission, or has a
-    /// newer mission. Otherwise the hello would trigger a repetition of the offer.
+    /// newer one. Otherwise the hello would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -128,8 +128,8 @@ impl Node {
         }
     }
 
-    /// Stores `upload` if it is newer than the stored mission. If the mission does not fit the line from Tx to Rx or
-    /// the geofence, it is refused, counted, and reported once.
+    /// Stores `upload` if it is newer than the stored mission. If it does not fit the line from Tx to Rx or the
+    /// geofence, it is refused, counted, and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
             Offered::Stored => self.on_stored(now),
@@ -146,7 +146,7 @@ impl Node {
     /// Reports the newly stored mission, offers it to both neighbours, and requests a view that uses it.
     fn on_stored(&mut self, now: Instant) {
         self.raise(Event::Uploaded);
-        // The leader needs the mission to propose it, and the other relays before the proposal reaches them.
+        // The leader needs the mission to propose it, and the other relays need it before the proposal reaches them.
         for side in [Side::Upstream, Side::Downstream] {
             self.layers.update.schedule_offer(side);
             self.layers.update.reset_offers(side);
@@ -176,8 +176,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles a neighbour's report that the mission `refused` is refused. Either the neighbour refuses it, or a
-    /// relay beyond the neighbour.
+    /// Handles a neighbour's report that the mission `refused` is refused. The neighbour or a relay beyond it has
+    /// refused the mission.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {
@@ -194,7 +194,7 @@ impl Node {
     }
 
     /// Compares `holds`, the stored mission of node `from` at `side`, with this relay's newest mission. If `holds` is
-    /// older, schedules an offer. If `holds` is newer, schedules a hello that requests an offer.
+    /// older, schedules an offer. If it is newer, schedules a hello that requests an offer.
     pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;
@@ -215,13 +215,13 @@ impl Node {
                 .outstanding()
                 .is_some_and(|proposed| proposed.mission_id == latest)
         {
-            // The proposal was waiting for that.
+            // The view proposal was waiting for the neighbour's mission.
             self.layers.view.resend();
         }
     }
 
-    /// Returns the pending mission offer to the neighbour at `side`; `None` if no offer is pending. An offer must
-    /// answer a recent hello; without a recent hello, the function returns a hello that requests a hello.
+    /// Returns the pending mission offer to the neighbour at `side`; `None` if none is pending. Without a recent hello
+    /// of the neighbour to answer, returns a hello that requests one.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

@@ -36,7 +36,7 @@ pub(super) fn upload_to(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Test helper: returns relay 2 of a chain of 3, which signs its frames if `signs` is true.
+/// Test helper: returns relay 2 of a chain of 3, with signed frames if `signs` is true.
 pub(super) fn relay(signs: bool) -> Node {
     relay_of(base(), 2, signs)
 }
@@ -53,7 +53,7 @@ pub(super) fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
     let identity = Identity { network: 1, index };
     let mut node = Node::new(&mission, identity, &settings, 1, Instant::ZERO);
     node.begin(identity, 1, Instant::ZERO);
-    // Discards the first messages, which the relay sends by itself.
+    // Discards the first messages, which the relay sends without a request.
     node.handle_timeout(NOW);
     sent_messages(&mut node);
     node
@@ -78,8 +78,7 @@ pub(super) fn sent_messages(node: &mut Node) -> heapless::Vec<(u16, Message), 8>
     said
 }
 
-/// Returns a hello of a node that has selected relay 2 as its neighbour. `holds` is the newest mission that the node
-/// has stored.
+/// Returns a hello of a node that has selected relay 2, and has stored the mission `holds`.
 pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
         mission: node.member.digest,
@@ -121,7 +120,7 @@ fn proposal(mission_id: MissionId) -> Message {
     })
 }
 
-/// Returns a valid mission offer to `node`. The offer has the number of a hello that `node` sends at `NOW`.
+/// Returns a valid mission offer to `node`. It repeats the number of a hello that `node` sends at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
     let offer_number = node.layers.update.next_offer_number(NOW, &node.member);
     Message::Offer {
@@ -130,7 +129,7 @@ fn offer(node: &mut Node, upload: Upload) -> Message {
     }
 }
 
-/// Returns a mission offer that answers the hello with the number `offer_number`.
+/// Returns a mission offer that repeats the number `offer_number` of a hello.
 fn offered(upload: Upload, offer_number: u16) -> Message {
     Message::Offer {
         upload,
@@ -162,7 +161,7 @@ fn the_mission_is_offered_before_the_proposal() {
     node.handle_message(NOW, Side::Upstream, 1, &said_now);
     assert_eq!(node.layers.update.latest(), new.id());
     assert_ne!(node.member.active, new.id());
-    // An offer answers a hello, so relay 2 requests one.
+    // An offer must answer a hello, so relay 2 requests a hello.
     let told = sent_messages(&mut node);
     assert!(
         matches!(
@@ -177,7 +176,7 @@ fn the_mission_is_offered_before_the_proposal() {
     let behind = hello(&node, old);
     node.handle_message(NOW, Side::Downstream, 3, &behind);
     assert_eq!(sent_messages(&mut node), [(3, offered(new, 9))]);
-    // A proposal waits for the offer too.
+    // A proposal also waits for the offer.
     node.handle_message(NOW, Side::Upstream, 1, &proposal(new.id()));
     assert_eq!(sent_messages(&mut node), [(3, offered(new, 9))]);
     // Relay 3 reports the mission.
@@ -203,7 +202,7 @@ fn a_relay_offers_a_newer_mission_or_reports_its_own() {
     );
     let new = upload(1);
     node.handle_upload(NOW, &new).unwrap();
-    // A neighbour without a known mission is at once requested to send a hello, which an offer can answer.
+    // The mission of the neighbour is unknown, so the relay at once requests a hello that an offer can answer.
     let told = sent_messages(&mut node);
     assert!(
         matches!(
@@ -278,8 +277,8 @@ fn an_offer_for_other_relays_is_refused() {
     );
 }
 
-/// Checks that an offer of a node that is not this relay's neighbour is answered by one hello only. Otherwise the
-/// exchange of offers and hellos between the two nodes would never end.
+/// Checks that an offer of a node that is not the neighbour is answered by one hello only. Otherwise the exchange of
+/// offers and hellos would never end.
 #[test]
 fn an_offer_of_an_unselected_node_is_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();
@@ -310,8 +309,8 @@ fn an_offer_of_an_unselected_node_is_answered_once() {
     );
 }
 
-/// Checks that an offer that arrives too late is answered by a hello only. A new offer that answers this hello is
-/// accepted.
+/// Checks that an offer that arrives too late is answered by a hello only. A new offer that repeats the number of this
+/// hello is accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {
@@ -323,7 +322,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             let held = node.layers.update.latest();
             let withheld = offer(&mut node, upload(1));
             if hellos {
-                // The relay continues to send hellos, whose number has changed by then.
+                // The relay continues to send hellos. Their number has changed by then.
                 let step = Settings::default().dead_after;
                 node.layers
                     .update
@@ -371,7 +370,7 @@ fn a_stored_upload_does_not_contain_the_offer_number() {
     assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
 }
 
-/// Returns a hello of node 1. `hears` is the bit mask of the nodes from which node 1 has received frames.
+/// Returns a hello of node 1. `hears` is the bit mask of the nodes that node 1 receives.
 fn hello_of(node: &Node, hears: u8) -> Message {
     let Message::Hello(hello) = hello(node, node.layers.update.latest()) else {
         unreachable!();
@@ -439,7 +438,7 @@ fn a_loss_and_a_mission_mismatch_name_the_node() {
     }
 }
 
-/// Checks that a spare requests no view until it joins the chain. A spare waits outside of the chain.
+/// Checks that a spare, which waits outside of the chain, requests no view until it joins.
 #[test]
 #[cfg(feature = "departures")]
 fn a_relay_outside_proposes_nothing() {

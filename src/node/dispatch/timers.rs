@@ -1,4 +1,4 @@
-//! Expired timers of all layers: silent neighbours, view requests, wait for the first pass.
+//! Expired timers of all layers: silent neighbours, view requests, wait for the first message.
 
 use super::Node;
 use crate::event::NodeEvent;
@@ -36,7 +36,8 @@ impl Node {
             }
         }
         if self.layers.leaving.is_outside() {
-            // A relay outside has no vote: an upload or the end of a computation must not make it propose.
+            // A relay outside of the chain has no vote. An upload or the end of a computation must not make it propose
+            // a view.
             self.layers.view.request.stop();
         } else if self.awaits_first() && self.is_solving(now) {
             if self.layers.view.request.is_due(now) {
@@ -85,7 +86,7 @@ impl Node {
         let node = neighbour.node();
         let ended = neighbour.has_no_peer();
         let dead = layers.lease.span(settings);
-        // Until the first lease many relays may search on the channel at the same time.
+        // Before the first lease many relays may search on the channel at the same time.
         let is_crowded = settings.wiring == Wiring::Shared && layers.lease.is_pending();
         let asking = is_crowded.then(|| patient_tick(settings, self.member.all));
         let lost = neighbour.handle_timeout(now, settings, dead, searches, asking);
@@ -109,7 +110,8 @@ impl Node {
         if self.layers.neighbours.at(self.onward()).has_no_peer()
             && self.layers.view.outstanding().is_some()
         {
-            // The next relay of the outstanding proposal is lost, so this relay is the last one and decides.
+            // The relay that should reply to the outstanding proposal is lost. So this relay is the last one and
+            // decides.
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.view.decide(&context);
             self.apply(now, effects);
@@ -123,8 +125,9 @@ impl Node {
             .is_solving(&self.layers.context(now, &self.member))
     }
 
-    /// Restarts the timers for silent neighbours and the first pass, after the joint method's computation. The time
-    /// that all relays spend on the computation must not let these timers expire.
+    /// Restarts the timers for silent neighbours and the first message, after the joint computation.
+    ///
+    /// All relays compute at the same time and send nothing, and these timers must not expire by that.
     fn on_solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);
@@ -135,14 +138,12 @@ impl Node {
         }
     }
 
-    /// Returns true until this relay's first pass or view request. A pass is a message along the chain, a view its
-    /// agreed membership.
+    /// Returns true until this relay's first message along the chain or view request.
     fn awaits_first(&self) -> bool {
         self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }
 
-    /// Starts the timeout of the first pass (message along the chain). If it expires, the relay requests a new view
-    /// (membership).
+    /// Starts the timeout of the first message along the chain. If it expires, the relay requests a new view.
     pub(super) fn await_first(&mut self, now: Instant) {
         let (settings, all) = (&self.member.settings, self.member.all);
         let there_and_back = settings.hop_time.times(2 * u32::from(all));

@@ -1,12 +1,14 @@
-//! Damping of flapping links: how long a node must be heard before it is selected or reported as heard.
+//! Damping of flapping links: how long a node must be received before it is selected.
 //!
-//! Each side counts how often it has lost the links to its four nearest nodes. A loss is that of the link, not of a frame. A link
-//! with more than two losses is held down: its node is neither selected nor reported as heard until it has been heard without a
-//! gap for `dead_after`, and for twice as long after every further loss, up to six times `dead_after`. Hellos omit links that are
-//! held down, so that no other relay makes room for a node that could not be linked.
+//! Each side counts how often it has lost the links to its four nearest nodes. Lost frames alone are no loss of the
+//! link. A link with more than two losses is held down: its node is neither selected nor reported as received until it
+//! has been received without a gap for `dead_after`. Every further loss doubles this time, up to six times
+//! `dead_after`. Hellos omit links that are held down, so that no other relay makes room for a node that could not be
+//! linked.
 //!
-//! A gap is a silence of more than `dead_after`. While the side has no neighbour and hears nobody, it is one of more than eight
-//! times `dead_after`: such a side asks every `dead_after` only, so a few lost frames make a silence of several times that.
+//! A gap is a silence of more than `dead_after`. While the side has no neighbour and receives no node, a gap is a
+//! silence of more than eight times `dead_after`. Such a side sends requests only every `dead_after`, so a few lost
+//! frames make a silence of several times that.
 //!
 //! | state of the side | event | losses |
 //! | --- | --- | --- |
@@ -15,27 +17,27 @@
 //! | without a neighbour | candidate heard again after a gap | one more for its link |
 //! | without a neighbour | first answer of any candidate, `probe_after` after the search began or later | all links: at least those of the link that was lost last |
 //!
-//! The last row is a partition: all links of the side were down together. If each link were counted alone, the chain would close
-//! over the second nearest node once the nearest one is held down, and every link would be forgiven two losses. A side forgets
-//! the losses of a link 32 times `dead_after` after the last one.
+//! The last row is a partition: all links of the side were down together. Suppose that each link were counted alone.
+//! The chain would then link the second nearest node once the nearest one is held down, and every link would be
+//! forgiven two losses. A side forgets the losses of a link 32 times `dead_after` after the last one.
 
 use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum number of times that the hold-down of a flapping (often lost) link doubles. A held-down link is not used.
+/// Maximum number of times that the hold-down of a flapping link doubles. A link flaps if it is lost repeatedly.
 const MAX_DOUBLINGS: u8 = 3;
 
-/// Maximum hold-down of a flapping (often lost) link, in units of `dead_after`. A held-down link is not used.
+/// Maximum time for which a flapping link is not used (hold-down), in units of `dead_after`.
 const MAX_HOLD_DOWN: u32 = 6;
 
-/// Maximum number of recent losses of a link that is not flapping yet.
+/// Maximum number of recent losses of a link before it counts as flapping.
 const MAX_FORGIVEN: u8 = 2;
 
-/// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
+/// Minimum time between two losses of a slowly flapping link, in units of `dead_after`.
 const SLOW_INTERVAL: u32 = 10;
 
-/// Time without a loss after which a link's earlier losses are forgotten, in units of `dead_after`.
+/// Time without a loss after which earlier losses of a link no longer count, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
 /// Node that is received without gaps: its distance, and the times of its first and last frame.
@@ -47,8 +49,8 @@ struct Heard {
 }
 
 impl Heard {
-    /// Returns the record of a node's gap-free reception after a frame from the node at `distance`. The record
-    /// restarts after a silence of more than `gap`, or if `known` is the record of another node.
+    /// Returns the record after a frame from the node at `distance`. The record restarts after a silence of more than
+    /// `gap`, or if `known` describes another node.
     fn updated(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
             Some(known) if known.distance == distance && now.since(known.last) <= gap => {
@@ -64,20 +66,19 @@ impl Heard {
     }
 }
 
-/// Record of losses of the link to one node. A link that was lost often (flaps) is not used for a while.
+/// Losses of the link to one node. After several losses the link is not used for a while.
 #[derive(Clone, Copy, Debug)]
 struct Link {
-    /// Time at which the link to the neighbour was last lost.
+    /// Time of the last loss of the link.
     lost_at: Instant,
-    /// Frames received since the last loss of the link: times of the first and the last frame. `None` if there was no
-    /// frame.
+    /// Times of the first and the last frame since the last loss of the link; `None` if there was none.
     back: Option<Heard>,
     losses: u8,
-    /// True if the last loss does not count as flapping, because the channel was bad.
+    /// True if the last loss does not count, because the channel was bad.
     excused: bool,
-    /// True if the last loss was an outage: no frame came for longer than `dead_after` after the loss.
+    /// True if no frame came for longer than `dead_after` after the last loss.
     was_down: bool,
-    /// Time between the last two losses of the link; 0 if no earlier loss counted.
+    /// Time between the last two losses of the link; 0 if there was no earlier loss that counts.
     interval: Duration,
 }
 
@@ -93,7 +94,7 @@ impl Link {
         }
     }
 
-    /// Returns how many times the link was lost recently; 0 if the last loss was long ago.
+    /// Returns the number of recent losses of the link; 0 if the last loss was long ago.
     #[inline(never)] // called from many places
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
         if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
@@ -103,8 +104,8 @@ impl Link {
         }
     }
 
-    /// Returns true while the link must not be used (hold-down), because it was lost repeatedly. The hold-down ends
-    /// once the node has been received without gaps for long enough.
+    /// Returns true while the link must not be used because it was lost repeatedly (hold-down). The hold-down ends once
+    /// the node has been received without gaps for long enough.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(MAX_FORGIVEN + 1) else {
             return false;
@@ -114,8 +115,9 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link. `losses` is the number of recent losses before this loss. If `counted` is false,
-    /// this loss does not count yet; it counts later if the node is then silent for long.
+    /// Records a loss of the link. `losses` is the number of recent losses before it.
+    ///
+    /// If `counted` is false, this loss counts only if the node is then silent for long.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -132,11 +134,10 @@ impl Link {
     }
 }
 
-/// Records of lost links to the four nearest nodes on one side, nearest node first.
+/// Losses of the links to the four nearest nodes on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that will be selected as the neighbour once it has been received without gaps for long enough. `None` if
-    /// there is no such node.
+    /// Node that will be selected once it has been received without gaps for long enough. `None` if there is none.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -149,8 +150,9 @@ impl Damping {
         }
     }
 
-    /// Clears the record of lost links when the relay starts, at `now`. The function works in place, because a copy
-    /// would need more stack than any other step of the start.
+    /// Clears the record of lost links at the start of the relay.
+    ///
+    /// It works in place, because a copy would need more stack than any other step of the start.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);
@@ -165,9 +167,11 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the link to the node `distance` relays away. On a channel that loses many frames `counts` is
-    /// false: then only the loss of a flapping link counts. If another link on this side flaps, the lost link takes
-    /// over the loss count of the flapping link. Reason: all links of a side cross the same gap in the chain.
+    /// Records the loss of the link to the node `distance` relays away. If `counts` is false, because the channel loses
+    /// many frames, only the loss of a flapping link counts.
+    ///
+    /// If another link on this side flaps, the lost link takes over its number of losses. All links of a side cross the
+    /// same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -183,9 +187,10 @@ impl Damping {
         }
     }
 
-    /// Records a frame of the node `distance` relays away. A long silence before this frame counts as a loss of the
-    /// link. `searching_since` is the start of the search, `None` if this side has a neighbour. During a search, a
-    /// link counts as lost if its node has answered and then was silent for longer than `gap`.
+    /// Records a frame of the node `distance` relays away. A long silence before it counts as a loss of the link.
+    ///
+    /// `searching_since` is the start of the search; `None` if this side has a neighbour. During a search, a link
+    /// counts as lost if its node has answered and then was silent for longer than `gap`.
     pub(super) fn record_hello(
         &mut self,
         distance: u16,
@@ -215,15 +220,15 @@ impl Damping {
         link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false until the
-    /// search has lasted for `probe_after`.
+    /// Returns true if no node has answered the search for a neighbour that began at `since`. False until the search
+    /// has lasted for `probe_after`.
     fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the loss counts of all links on this side to the count of the link that was lost last. These links were
-    /// lost together, because all of them cross the same gap in the chain.
+    /// Raises the losses of all links on this side to those of the link lost last. These links were lost together,
+    /// because all of them cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
@@ -237,14 +242,14 @@ impl Damping {
         }
     }
 
-    /// Returns true while the link to the node `distance` relays away must not be used, because it flaps.
+    /// Returns true while the link to the node `distance` relays away must not be used because it flaps.
     pub(super) fn is_held_down(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let link = self.link(distance);
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if a link on this side flaps slowly (is lost repeatedly, at long intervals). The next loss of
-    /// such a link should be detected early.
+    /// Returns true if a link on this side is lost repeatedly at long intervals. The next loss of such a link should be
+    /// detected early.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -258,8 +263,7 @@ impl Damping {
         self.link(distance).is_some_and(|link| link.was_down)
     }
 
-    /// Returns the nodes whose links are in hold-down, as a bit mask. Their links flap and are not used; bit 0 is the
-    /// nearest node.
+    /// Returns a bit mask of the nodes whose links must not be used because they flap. Bit 0 is the nearest node.
     pub(super) fn held_down_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
             .filter(|distance| self.is_held_down(*distance, now, settings))
@@ -271,8 +275,8 @@ impl Damping {
         self.candidate = None;
     }
 
-    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if the node has
-    /// been received without gaps for at least `probe_after` and at least `more`.
+    /// Records a frame of a candidate `distance` relays away. Returns true if it has been received without gaps for at
+    /// least `probe_after` and at least `more`.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,
@@ -280,7 +284,8 @@ impl Damping {
         now: Instant,
         settings: &Settings,
     ) -> bool {
-        // If two nodes are heard alternately the nearer one counts; otherwise neither would be heard without a gap.
+        // If two nodes are received alternately the nearer one counts. Otherwise neither would be received without a
+        // gap.
         if let Some(known) = self.candidate
             && known.distance < distance
             && now.since(known.last) <= settings.dead_after
@@ -313,8 +318,8 @@ mod tests {
         (Damping::new(now), now, Settings::default())
     }
 
-    /// Simulates a loss of the link to the nearest node for 40 s. During this time this side searches for a
-    /// neighbour, and the nodes `heard` answer. `heard` has their distances, in relays.
+    /// Simulates a loss of the link to the nearest node for 40 s. Meanwhile this side searches for a neighbour, and the
+    /// nodes at the distances `heard` (in relays) answer.
     fn outage(side: &mut Damping, now: &mut Instant, heard: &[u16], settings: &Settings) {
         let search = *now;
         side.record_loss(1, true, search, settings);

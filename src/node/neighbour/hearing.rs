@@ -1,4 +1,4 @@
-//! Nodes on one side: recently heard, consecutive events, and pending hellos.
+//! Nodes on one side: recently received nodes, consecutive events, and pending hellos.
 
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -8,8 +8,8 @@ pub(crate) use crate::wire::CANDIDATES;
 /// Minimum interval between two reports to the firmware about the same refused node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// Number of consecutive events of one kind at each of the four nearest nodes. An event is, for example, a handshake
-/// signed with another key.
+/// Number of consecutive events at each of the four nearest nodes. An event is, for example, a handshake signed with
+/// another key.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
@@ -39,7 +39,7 @@ impl ConsecutiveCounts {
     }
 }
 
-/// Set of nodes on one side that have been received recently.
+/// Set of recently received nodes on one side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hearing {
     since: Instant,
@@ -47,10 +47,9 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Nodes on one side that this relay has refused in the last one to two minutes.
+/// Nodes on one side whose mission or key was refused in the last one to two minutes.
 ///
-/// The masks have the nodes with another mission in bits 0 to 3, and those with another key in bits 4 to 7; the nearest
-/// node first.
+/// Bits 0 to 3 are the nodes with another mission, and bits 4 to 7 those with another key, the nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refusals {
     since: Instant,
@@ -65,18 +64,18 @@ impl Refusals {
         before: 0,
     };
 
-    /// Records a message with another mission of the node `distance` relays away. Returns true at most once a minute
+    /// Records a message with another mission from the node `distance` relays away. Returns true at most once a minute
     /// for each node.
     pub(super) fn add_mission(&mut self, distance: u16, now: Instant) -> bool {
         self.add(mask(distance), now)
     }
 
-    /// Records a handshake of the node `distance` relays away, signed with another key.
+    /// Records a handshake with another key from the node `distance` relays away.
     pub(super) fn add_key(&mut self, distance: u16, now: Instant) {
         self.add(mask(distance) << CANDIDATES, now);
     }
 
-    /// Forgets the other key of the node `distance` relays away.
+    /// Records that the node `distance` relays away no longer uses another key.
     pub(super) fn remove_key(&mut self, distance: u16) {
         let kept = !(mask(distance) << CANDIDATES);
         self.now &= kept;
@@ -85,7 +84,7 @@ impl Refusals {
 
     /// Returns the distances of the nearest nodes with another mission and with another key; 0 for none.
     ///
-    /// Only nodes nearer than `end` relays away count.
+    /// Only nodes fewer than `end` relays away count.
     pub(super) fn nearest(mut self, now: Instant, end: u16) -> [u16; 2] {
         self.age(now);
         let nodes = self.now | self.before;
@@ -117,8 +116,7 @@ impl Refusals {
     }
 }
 
-/// Returns the bit of the node `distance` relays away in a mask of nodes. 0 if it is not one of the four nearest
-/// nodes.
+/// Returns the bit of the node `distance` relays away in a bit mask. 0 if it is not one of the four nearest nodes.
 pub(crate) const fn mask(distance: u16) -> u8 {
     if distance >= 1 && distance <= CANDIDATES {
         1 << (distance - 1)
@@ -141,8 +139,8 @@ impl Hearing {
         self.now |= mask(distance);
     }
 
-    /// Returns the nodes received recently, as a bit mask; bit 0 is the nearest node. A node stays in the mask for
-    /// one to two times `probe_after` after its last frame.
+    /// Returns a bit mask of the recently received nodes; bit 0 is the nearest node. A node stays in the mask for one
+    /// to two times `probe_after` after its last frame.
     pub(super) fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
         self.age(now, settings);
         self.now | self.before
@@ -161,8 +159,9 @@ impl Hearing {
     }
 }
 
-/// Pending hellos to the four nearest nodes on one side, as bit masks; bit 0 is the nearest node. One mask has all
-/// pending hellos, the other mask the hellos that request an answer.
+/// Pending hellos to the four nearest nodes on one side, as bit masks; bit 0 is the nearest node.
+///
+/// One mask has all pending hellos, the other mask those that request an answer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     due: u8,
@@ -172,7 +171,7 @@ pub(super) struct Hellos {
 impl Hellos {
     pub(super) const NONE: Self = Self { due: 0, reply: 0 };
 
-    /// Schedules a hello to the node `distance` relays away; if `ask` is true it requests an answer.
+    /// Schedules a hello to the node `distance` relays away. If `ask` is true, it requests an answer.
     pub(super) const fn schedule(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
         self.due |= bit;
@@ -187,8 +186,8 @@ impl Hellos {
         self.reply = 0x0F;
     }
 
-    /// Returns the distance, in relays, of the nearest node with a pending hello, and marks it as sent. The second
-    /// value is true if the hello requests an answer. `None` if no hello is pending.
+    /// Returns the distance of the nearest node with a pending hello, and marks the hello as sent. The distance is in
+    /// relays. The second value is true if the hello requests an answer. `None` if no hello is pending.
     pub(super) fn poll(&mut self) -> Option<(u16, bool)> {
         let distance = (1..=CANDIDATES).find(|distance| self.due & mask(*distance) != 0)?;
         let bit = mask(distance);

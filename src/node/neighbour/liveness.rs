@@ -1,45 +1,50 @@
 //! Liveness: detection of a lost neighbour.
 //!
-//! A sign of life is an answer to something that this relay sent: a heartbeat with the number of its question, the reply to a
-//! renewal or a pass, or the next of these. It counts from the time at which this relay sent, so a replayed recording proves
-//! nothing. After `Settings::probe_after` without a sign of life, or the round trip through the whole chain if that is longer,
-//! this relay sends questions until one is answered. The neighbour is lost once both conditions hold:
+//! A sign of life is an answer to something that this relay sent: a heartbeat with the number of its question, the
+//! reply to a renewal or another message along the chain, or the next such message. It counts from the time at which
+//! this relay sent, so a replayed recording proves nothing.
+//!
+//! This relay waits for a sign of life for `Settings::probe_after`, or for the round trip through the whole chain if
+//! that is longer. Then it sends questions (heartbeat requests) until one is answered. The neighbour is lost once both
+//! conditions hold:
 //!
 //! | condition | reason |
 //! | --- | --- |
 //! | silence of `Settings::dead_after`, or of the lease's span if that is longer | - |
-//! | sixteen unanswered questions, and three times as many as before a recent answer | a run of lost frames is not a lost neighbour |
+//! | sixteen unanswered questions, and three times the longest recent number of unanswered questions before an answer | a run of lost frames is not a lost neighbour |
 //!
-//! The longest run before a recent answer counts as sixteen at first, and each answer lowers it by an eighth. So a neighbour that is
-//! silent after its first frames is lost after 48 questions, one that has answered some ten times after sixteen, and one that was
-//! never received after sixteen.
+//! This longest number is sixteen at first, and each answer lowers it by an eighth. So a neighbour that is silent after
+//! its first frames is lost after 48 questions. After some ten answers it is lost after sixteen, like a neighbour that
+//! was never received.
 //!
-//! It is also lost after eight times `dead_after`. From then on, a question is sent every `probe_after`. Relays of one view that
-//! choose their positions jointly compute at the same time and send nothing meanwhile. The silence of a neighbour in the same
-//! view therefore counts from the end of this relay's own computation.
+//! A neighbour is also lost after eight times `dead_after`. From then on, a question is sent every `probe_after`.
+//! Relays of one view that choose their positions jointly compute at the same time and send nothing meanwhile. The
+//! silence of a neighbour in the same view therefore counts from the end of this relay's own computation.
 
 use crate::node::context::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost. Exception: after a silence of
-/// the maximum lease duration it counts as lost in any case.
+/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost.
+///
+/// After a silence of the maximum lease duration it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor on the longest recent run of unanswered heartbeat requests. A neighbour counts as lost after this multiple
-/// of unanswered requests, or after the maximum lease duration.
+/// A neighbour counts as lost after this multiple of its longest recent run of unanswered requests.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between heartbeat requests to a silent neighbour. The interval is a round trip through `all`
-/// relays, but short enough for sixteen requests between `probe_after` and `dead_after`.
+/// Returns the interval between heartbeat requests to a silent neighbour.
+///
+/// It is the round trip through `all` relays, but short enough for sixteen requests between `probe_after` and
+/// `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
 
 /// Returns the interval between heartbeat requests while many relays have no agreement yet.
 ///
-/// The interval is longer than usual, because all these relays search on one channel. It is still short enough for three requests between
-/// `probe_after` and `dead_after`.
+/// It is longer than usual, because all these relays search on one channel. It is still short enough for three requests
+/// between `probe_after` and `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
@@ -64,7 +69,7 @@ fn third(number: u64) -> u64 {
     u64::from(high / 3) << 32 | u64::from(rest)
 }
 
-/// Returns the round trip time through a chain of `all` relays, but at most `most_micros` microseconds.
+/// Returns the round trip time through a chain of `all` relays, at most `most_micros` µs.
 #[inline(never)] // called from both
 fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     let least = waiting(settings) / 64 + 1;
@@ -73,23 +78,22 @@ fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     Duration::from_micros(micros)
 }
 
-/// Returns the silence of a neighbour after which a heartbeat is requested. This silence is the longer of two times:
-/// `Settings::probe_after`, and the round trip through a chain of `all` relays (at most the longest lease).
+/// Returns the silence of a neighbour after which a heartbeat is requested. It is `Settings::probe_after`, or the round
+/// trip through `all` relays if that is longer, and at most the longest lease.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Number of the latest heartbeat requests to which a reply is still accepted.
+/// Number of the latest heartbeat requests whose replies are still accepted.
 const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Latest time at which the neighbour is known to have been alive. At first this is the time of this relay's
-    /// start.
+    /// Latest time at which the neighbour is known to have been alive; at first the start of this relay.
     last_sign: Instant,
     lost: bool,
-    /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.
+    /// True if the neighbour has been received since the start, or since it was lost.
     was_received: bool,
     /// Number of the last heartbeat request to the neighbour, 0 if none was sent.
     request_number: u16,
@@ -97,22 +101,22 @@ pub(crate) struct Liveness {
     request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour was last known to be alive.
     unanswered: u16,
-    /// Longest recent run of unanswered heartbeat requests before a reply. This number measures the losses of the
-    /// channel. The number starts at [`MIN_REQUESTS`] and decays with each reply.
+    /// Longest recent run of unanswered heartbeat requests before a reply. It measures the losses of the channel.
+    ///
+    /// It starts at [`MIN_REQUESTS`] and decays with each reply.
     longest: u16,
 }
 
-/// Result of the check whether a silent neighbour is lost.
+/// Result of the check of a silent neighbour.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Silence {
-    /// True if this check has found that the neighbour is lost.
+    /// True if this check has found the neighbour to be lost.
     pub(crate) lost: bool,
-    /// Time of the next check of the neighbour's silence.
     pub(crate) next_check: Instant,
 }
 
 impl Liveness {
-    /// Liveness record of a neighbour before this relay starts: all zeros.
+    /// State before this relay starts: all zeros.
     pub(super) const NONE: Self = Self {
         longest: 0,
         ..Self::new(Instant::ZERO)
@@ -130,10 +134,11 @@ impl Liveness {
         }
     }
 
-    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is kept,
-    /// because it describes the channel. The unanswered requests to the previous node count as a run, unless `was_down`
-    /// is true: they then measure an outage of the link. If `flaps` is true (the link flaps slowly), all runs are
-    /// dropped.
+    /// Restarts the record for another node as the neighbour. The longest run of unanswered requests is kept, because
+    /// it describes the channel.
+    ///
+    /// The unanswered requests to the previous node count as a run, unless `was_down` is true: then they measure an
+    /// outage of the link. If `flaps` is true (the link flaps slowly), all runs are dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS
@@ -158,14 +163,12 @@ impl Liveness {
         self.was_received && !self.lost
     }
 
-    /// Returns true if the neighbour is lost, and no frame of it has been received since.
+    /// Returns true if the neighbour is lost and has not been received since.
     pub(crate) const fn is_silent(&self) -> bool {
         self.lost && !self.was_received
     }
 
-    /// Returns the longest silence of a live neighbour, caused only by lost frames.
-    ///
-    /// The silence is counted as lost requests, one every `tick`.
+    /// Returns the longest silence that lost frames alone can cause, counted as requests lost every `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }
@@ -180,7 +183,7 @@ impl Liveness {
         self.was_received = true;
     }
 
-    /// Records that the neighbour was alive at time `at`. Returns true if it was lost until now.
+    /// Records that the neighbour was alive at time `at`. Returns true if it counted as lost before.
     pub(crate) fn record_sign_of_life(&mut self, at: Instant) -> bool {
         self.last_sign = self.last_sign.max(at);
         self.was_received = true;
@@ -211,8 +214,9 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`. Reason: relays send nothing while they compute.
-    /// Returns false, and does nothing, if the neighbour is lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, after this relay's computation.
+    ///
+    /// Relays send nothing while they compute. Returns false, and does nothing, if the neighbour is lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.last_sign = now;
@@ -220,8 +224,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the silent neighbour is lost. The neighbour is never lost before a silence of `dead`. `tick`
-    /// is the time to the next check.
+    /// Checks at `now` if the silent neighbour is lost, which needs at least a silence of `dead`. `tick` is the time to
+    /// the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

@@ -26,14 +26,14 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// State of the neighbours on both sides before the relay starts.
+    /// State of both sides before the relay starts.
     pub(crate) const NONE: Self = Self {
         upstream: Neighbour::NONE,
         downstream: Neighbour::NONE,
     };
 
-    /// Starts both sides of relay `node` at `now`. The first neighbours are the relays with the next node numbers, in
-    /// a chain of `all` relays.
+    /// Starts both sides of relay `node` at `now`. Its first neighbours are the relays with the next node numbers, in a
+    /// chain of `all` relays.
     pub(crate) fn begin(
         &mut self,
         node: u16,
@@ -71,27 +71,27 @@ impl Neighbours {
         [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
     }
 
-    /// Returns true if a neighbour has changed since the last decision on a view (membership of the chain).
+    /// Returns true if a neighbour has changed since the last decision on a view.
     pub(crate) fn have_changed(&self, now: Instant) -> bool {
         self.upstream.has_changed(now) || self.downstream.has_changed(now)
     }
 
-    /// Leaves the view (membership of the chain): until the next view no neighbour counts as a member.
+    /// Leaves the view: until the next view no neighbour counts as a member.
     pub(crate) const fn leave(&mut self) {
         self.upstream.leave();
         self.downstream.leave();
     }
 
-    /// Records on both sides that a view proposal was refused. A side requests no new view until its neighbour
-    /// changes.
+    /// Records that a view proposal was refused. A side requests no new view until its neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();
     }
 
-    /// Returns the next pending heartbeat: its side, its destination, and two numbers; 0 means none. The first number
-    /// is the number of this relay's request to the neighbour. The second number is the number of the neighbour's
-    /// request that the heartbeat answers. `None` if no heartbeat is pending.
+    /// Returns the next pending heartbeat; `None` if none is pending.
+    ///
+    /// The values are: side, destination node, number of this relay's request, and number of the neighbour's request
+    /// that is answered. A number 0 means none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

@@ -1,30 +1,37 @@
-//! Side of a relay: selection of the neighbour, and reaction to its silence.
+//! Selection of the neighbour on one side of a relay, and reaction to its silence.
 //!
-//! | state | neighbour lost | hello of the neighbour does not name this relay | hello received from another node that hears this relay | timer |
+//! | state | neighbour lost | hello of the neighbour does not name this relay | hello received from another node that receives this relay | timer |
 //! | --- | --- | --- | --- | --- |
 //! | `Linked` | shared channel: `Searching`; otherwise continue to send questions | `Pairing` | selected instead after `probe_after`, if it is better and its link is not held down | without a quorum for three times `dead_after`, and every four times from then on: `Searching` |
-//! | `Pairing` | `Searching` | - | as above | after a span: `Searching`; without a quorum as above |
-//! | `Searching` | - | - | selected unless its link is held down; a farther one not before nearer ones could be heard, one that was given up for want of a quorum after `probe_after` | after a span: `NoPeer` |
-//! | `NoPeer` | - | - | selected unless its link is held down: at once if it has selected this relay, else after `probe_after` | hello to the four nearest nodes every `dead_after`, every half of `probe_after` once one was heard |
+//! | `Pairing` | `Searching` | - | as above | after the wait below: `Searching`; without a quorum as above |
+//! | `Searching` | - | - | selected unless its link is held down; a farther one not before nearer ones could be received; one whose link was dropped without a quorum after `probe_after` | after the wait below: `NoPeer` |
+//! | `NoPeer` | - | - | selected unless its link is held down: at once if it has selected this relay, else after `probe_after` | hello to the four nearest nodes every `dead_after`, every half of `probe_after` once one was received |
 //!
-//! A span is `dead_after` less `probe_after`, or the longest plausible run of lost frames on this channel if that is longer. A
-//! selected neighbour is `Pairing` until its hello names this relay and reports hearing it, or any other message arrives from it:
-//! then it is `Linked`. A hello of the linked node that names this relay but does not report hearing it changes nothing, because
-//! a run of lost frames is measured by silence. A node that has selected another one is not selected.
+//! The wait is `dead_after` less `probe_after`, or the longest plausible run of lost frames on this channel if that is
+//! longer. A selected neighbour is `Pairing` until its hello names this relay and reports that it receives it, or any
+//! other message arrives from it. Then it is `Linked`. A hello of the linked node that names this relay but does not
+//! report that it receives it changes nothing, because a run of lost frames is measured by silence. A node that has
+//! selected another one is not selected.
 //!
-//! *Better* is a nearer node that is heard by the node beyond it. A farther node is better in two cases: more relays follow it than
-//! follow the neighbour; or as many follow it as followed the neighbour in the last view. In the second case the neighbour has no
-//! link on its other side, and the chain goes on without it. A neighbour that is ordered to leave is replaced at once by the node
-//! beyond it. A node that was the neighbour before the present one is selected again without a waiting time. If two links cross, as
-//! 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
-//! neither part of the chain could go on. The link of the node nearest to Rx is then given up: 4 selects 3, and 2 is left out.
+//! *Better* is a nearer node that the node beyond it receives. A farther node is better in two cases. Either more
+//! relays follow it than follow the neighbour. Or as many follow it as followed the neighbour in the last view. In the
+//! second case the neighbour has no link on its other side, and the chain continues without it.
 //!
-//! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, the selected one among
-//! them: up to three relays in a row may be lost at once. A node that is selected after `probe_after` must be heard without a gap
-//! for that time; of several nodes the nearest one counts. Links that were lost repeatedly are held down (see
-//! [`damping`](super::damping)). On wires, only questions are sent to a lost neighbour until it answers. A node that returns
-//! causes a request for a new view `probe_after` later, because the node on its other side may be about to select it, too.
-//! During this grace period, proposals from the returned node that would leave relays out are dropped, and retransmitted later.
+//! A neighbour that is ordered to leave is replaced at once by the node beyond it. A node that was the neighbour before
+//! the present one is selected again without a waiting time.
+//!
+//! Two links can cross, such as 1 - 3 and 2 - 4 while 2 and 3 do not receive each other. Neither part of the chain
+//! could then continue. So the link of the node nearest to Rx is given up: 4 selects 3, and 2 is left out.
+//!
+//! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, including the
+//! selected one. The reason is that up to three relays in a row may be lost at once. A node that is selected after
+//! `probe_after` must be received without a gap for that time. Of several nodes the nearest one counts. Links that were
+//! lost repeatedly are held down (see [`damping`](super::damping)). On wires, only questions are sent to a lost
+//! neighbour until it answers.
+//!
+//! A node that returns causes a request for a new view `probe_after` later. The node on its other side may be about to
+//! select it, too. During this grace period, proposals from the returned node that would leave relays out are dropped,
+//! and retransmitted later.
 
 use super::damping::Damping;
 use super::hearing::Hellos;
@@ -40,9 +47,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// Linked: this relay and the node have selected each other, by the node's last report.
+    /// The node has selected this relay, too, according to its last report.
     Linked,
-    /// Pairing: this relay has selected a node, but this node does not select this relay (any more).
+    /// The node that this relay has selected has not selected this relay, or no longer does.
     Pairing {
         since: Instant,
     },
@@ -57,14 +64,13 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour; 0 if there is none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// End of the time after the selection of a neighbour in which no new view is requested. The relay beyond the
-    /// neighbour possibly selects the neighbour at the same time. One view change is enough for both selections.
+    /// Time until which no new view is requested after the selection of a neighbour. The relay beyond it possibly
+    /// selects the neighbour at the same time, and one view change is enough for both.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Node whose link was dropped because there was no quorum. 0 if no link was dropped since a neighbour was last
-    /// selected.
+    /// Node whose link was dropped because there was no quorum; 0 if another was selected since.
     dropped: u16,
     /// Previous neighbour, which a nearer node has replaced; 0 for none.
     replaced: u16,
@@ -72,42 +78,40 @@ pub(crate) struct Neighbour {
     searches_since: Instant,
     /// Distance to the selected neighbour, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
-    /// Nodes on this side that have recently reported that they receive this relay.
+    /// Nodes on this side that have recently reported to receive this relay.
     pub(super) two_way: Hearing,
-    /// Neighbours that the four nearest nodes on this side have selected in the direction of this relay. One entry
-    /// for each of the four, the nearest first: the number of its neighbour; 0 for none.
+    /// Neighbours that the four nearest nodes on this side have selected toward this relay; 0 for none.
+    ///
+    /// The entry of the nearest node is the first.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame on this side from a node that is not the selected neighbour. `None` if there was no
-    /// such frame.
+    /// Time of the last frame on this side from a node that is not the neighbour. `None` if there was none.
     unselected_at: Option<Instant>,
-    /// Nodes on this side of the relay from which it has recently received frames.
+    /// Nodes on this side that this relay has recently received.
     pub(super) hearing: Hearing,
-    /// Number of consecutive hellos of each node on this side that do not list this relay as received.
+    /// Number of consecutive hellos, for each node, that do not list this relay as received.
     pub(super) not_received: ConsecutiveCounts,
-    /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. The reports are events for
-    /// the firmware. Bit 0 is the nearest node.
+    /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Bit 0 is the nearest node.
     reported_found: u8,
-    /// Nodes on this side that this relay has refused lately.
+    /// Nodes on this side whose mission or key this relay has recently refused.
     refusals: Refusals,
-    /// Number of consecutive handshakes signed with another key, for each node on this side.
+    /// Number of consecutive handshakes with another key, for each node on this side.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
-    /// Silence of the neighbour after which a heartbeat is requested from it.
+    /// Silence of the neighbour after which a heartbeat is requested.
     patience: Duration,
     jitter: Jitter,
     pub(super) heartbeat: PendingHeartbeat,
-    /// Newest mission that the neighbour has reported to have stored; `None` before its first report.
+    /// Newest mission that the neighbour has reported as stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
-    /// Time of the next check of the neighbour's silence, or of the search's next hellos. `None` if neither is
+    /// Time of the next check of the neighbour's silence, or of the next hellos of the search. `None` if neither is
     /// needed.
     check_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
 
 impl Neighbour {
-    /// State of the neighbour on one side before the relay starts. All values are zero, so that no copy is kept in
-    /// flash.
+    /// State before the relay starts. All values are zero, so that no copy is kept in flash.
     pub(super) const NONE: Self = Self {
         node: 0,
         agreed: AgreedNodes::on(0),
@@ -136,7 +140,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts the neighbour state of this side at `now`. The mission configures `node` as the neighbour; 0 for none.
+    /// Starts this side at `now`. The mission configures `node` as the neighbour; 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -162,10 +166,10 @@ impl Neighbour {
         self.node = node;
         self.agreed = AgreedNodes::on(node);
         self.state = NeighbourState::Linked;
-        // Other relays may have closed up since, so this relay announces itself soon.
+        // Other relays may have closed the gap that this relay left, so it announces itself soon.
         let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
         let wait = match settings.wiring {
-            // The first pass arrives without a request.
+            // The first message along the chain arrives without a request.
             Wiring::Pair => self.patience.max(first_pass(settings, all)),
             Wiring::Shared => soon,
         };
@@ -176,13 +180,12 @@ impl Neighbour {
         self.node
     }
 
-    /// Returns true if this side has no neighbour, and the search for one has ended without success.
+    /// Returns true if this side has no neighbour and no longer searches for one.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true for a short time after a neighbour was selected. Its selection then causes no request for a new
-    /// view.
+    /// Returns true for a short time after a neighbour was selected. During this time no new view is requested.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
@@ -192,17 +195,17 @@ impl Neighbour {
         self.liveness.is_present()
     }
 
-    /// Returns true if the selected neighbour is lost, and none of its frames was received since the loss.
+    /// Returns true if the selected neighbour is lost and has not been received since.
     pub(crate) const fn is_silent(&self) -> bool {
         self.liveness.is_silent()
     }
 
-    /// Records that the neighbour was alive at time `at`. Returns true if it was lost until now.
+    /// Records that the neighbour was alive at time `at`. Returns true if it counted as lost before.
     pub(crate) fn record_sign_of_life(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.record_sign_of_life(at);
         if self.is_mutual() {
             let next = (self.liveness.last_sign_of_life() + self.patience).max(now + self.tick);
-            // An answer to an old message does not advance the next check.
+            // An answer to an old message must not make the next check earlier.
             let next = self.check_at.map_or(next, |at| at.max(next));
             // A new neighbour triggers a view request at the end of its grace period.
             let waits = self.node != self.agreed.counted() && now < self.grace;
@@ -211,13 +214,13 @@ impl Neighbour {
         back
     }
 
-    /// Returns true if this relay and the selected neighbour have selected each other. The neighbour's last report
-    /// shows its selection.
+    /// Returns true if this relay and its neighbour have selected each other. The neighbour's last report shows its
+    /// selection.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }
 
-    /// Records if the neighbour has selected this relay: yes if `mutual` is true. Returns true if this is a change.
+    /// Records whether the neighbour has selected this relay (`mutual`). Returns true if this is a change.
     pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -232,15 +235,17 @@ impl Neighbour {
         true
     }
 
-    /// Returns true if the selected neighbour must be reported as found now, and marks it as reported.
+    /// Returns true if the neighbour must be reported as found now, and marks it as reported.
     pub(crate) const fn should_report_found(&mut self) -> bool {
         let before = self.reported_found;
         self.reported_found |= mask(self.distance);
         self.reported_found != before
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`. Reason: relays send nothing while they compute.
-    /// Returns false, and does nothing, unless the neighbour is linked, a member of the view and not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, after this relay's computation.
+    ///
+    /// Relays send nothing while they compute. Returns false, and does nothing, unless the neighbour is linked, a
+    /// member of the view and not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -251,7 +256,7 @@ impl Neighbour {
         excused
     }
 
-    /// Returns true if it is time to check the neighbour's silence, or to send the search's next hellos.
+    /// Returns true if the neighbour's silence must be checked, or the search's next hellos must be sent.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.check_at.is_some_and(|at| at <= now)
     }
@@ -260,7 +265,7 @@ impl Neighbour {
         self.check_at
     }
 
-    /// Handles the timer of this side. Returns true if the neighbour has become lost by this call.
+    /// Handles the timer of this side. Returns true if this call has found the neighbour to be lost.
     ///
     /// A neighbour is not lost before a silence of `dead`. If `can_search` is true, another node can be selected in
     /// place of a lost neighbour, as on a shared channel. `interval` is the time between heartbeat requests; `None` for
@@ -336,9 +341,9 @@ impl Neighbour {
 
     /// Returns the silence of a node after which the link to it counts as lost.
     ///
-    /// This silence is usually `dead_after`. But a side that receives no node sends hellos only every `dead_after`,
-    /// and a few lost frames then cause a silence several times as long. For such a side the result is the maximum
-    /// duration of a lease.
+    /// It is usually `dead_after`. A side that receives no node sends hellos only every `dead_after`, and a few lost
+    /// frames then cause a silence several times as long. For such a side the result is the maximum duration of a
+    /// lease.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
         if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
             longest_lease(settings)
@@ -360,8 +365,7 @@ impl Neighbour {
         self.unselected_at = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour; else `None`. In a search this side sends
-    /// hellos to the four nearest nodes.
+    /// Returns the start of the search while this side has no neighbour; otherwise `None`.
     pub(super) const fn searching_since(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -369,7 +373,7 @@ impl Neighbour {
         }
     }
 
-    /// Gives up the selected neighbour. No search follows if `ends` is true: the chain ends here, or this relay
+    /// Gives up the selected neighbour. If `ends` is true, no search follows, because the chain ends here or this relay
     /// leaves it.
     pub(crate) fn give_up(&mut self, now: Instant, ends: bool) {
         self.search(now);
@@ -393,13 +397,13 @@ impl Neighbour {
         self.hellos.schedule_all();
     }
 
-    /// Returns true if the link to `node` was dropped for lack of a quorum. The result is false once another node has
-    /// been selected.
+    /// Returns true if the link to `node` was the last to be dropped for lack of a quorum. False once a node has been
+    /// selected.
     const fn was_dropped(&self, node: u16) -> bool {
         node != 0 && self.dropped == node
     }
 
-    /// Drops the selected neighbour and starts a new search. Reason: the reachable relays are too few for a quorum.
+    /// Drops the selected neighbour and starts a search, because too few relays for a quorum are reachable.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -411,9 +415,11 @@ impl Neighbour {
         }
     }
 
-    /// Selects `candidate` as the neighbour if this side has no neighbour, or if the candidate is better. Returns
-    /// true if the candidate was selected. A node is better if it is nearer, or if it leads to more relays. The
-    /// candidate has sent a hello, receives this relay, and has selected this relay, no node, or a node farther away.
+    /// Selects `candidate` if this side has no neighbour, or if the candidate is better. Returns true if it was
+    /// selected. A node is better if it is nearer, or if more relays can be reached through it.
+    ///
+    /// The candidate has sent a hello, receives this relay, and has selected this relay, no node, or a node farther
+    /// away.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
@@ -429,7 +435,7 @@ impl Neighbour {
         }
         let is_selected = match self.state {
             NeighbourState::Searching { since } => {
-                // A nearer node may be heard soon, or any other node than the one that was given up.
+                // A nearer node may be received soon, or a node other than the dropped one.
                 let wait = if self.was_dropped(node) {
                     settings.probe_after
                 } else {
@@ -441,7 +447,7 @@ impl Neighbour {
                 candidate.pairs || self.damping.has_waited(distance, none, now, settings)
             }
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
-                // If two relays could each leave out a node, the one nearer to Rx does, unless that takes long.
+                // If each of two relays could leave out a node, the relay nearer to Rx does, unless that takes long.
                 let waits = !candidate.nearer && candidate.downstream;
                 let more = if waits {
                     settings.dead_after.times(2)
@@ -483,7 +489,7 @@ impl Neighbour {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
-    /// Distance of the candidate, in relays along the chain: 1 for the next node number.
+    /// Distance of the candidate, in relays; 1 for the next node number.
     pub(crate) distance: u16,
     /// True if the candidate is toward Rx, false if it is toward Tx.
     pub(crate) downstream: bool,
@@ -491,80 +497,78 @@ pub(crate) struct Candidate {
     pub(crate) pairs: bool,
     /// True if the candidate is nearer in the chain than the selected neighbour.
     pub(crate) nearer: bool,
-    /// True if the candidate reports that it can be inserted between this relay and the selected neighbour.
+    /// True if the candidate reports that it fits between this relay and the selected neighbour.
     pub(crate) ready: bool,
     /// True if more relays can be reached through the candidate than through the selected neighbour.
     pub(crate) longer: bool,
-    /// True if the selected neighbour is ordered to leave, and the candidate is beyond it.
+    /// True if the selected neighbour is ordered to leave and the candidate is the node beyond it.
     pub(crate) passes: bool,
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, without the nearest node. The nearest node is
-    /// lost. Each of the other nodes delays the selection of the candidate, because a nearer node could still answer.
+    /// Returns the number of nodes between this relay and the candidate, without the nearest node. That node is lost.
+    /// Each of the others could still answer, and delays the selection of the candidate.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
 
-    /// Returns true if the candidate should replace the selected neighbour. A nearer candidate must be `ready`; a
-    /// farther candidate must lead to more relays.
+    /// Returns true if the candidate should replace the selected neighbour. A nearer candidate must be `ready`. Through
+    /// a farther candidate more relays must be reachable.
     pub(super) const fn is_better(self) -> bool {
         if self.nearer { self.ready } else { self.longer }
     }
 }
 
 impl Neighbour {
-    /// Returns true if the neighbour has changed since the last decision on a view proposal. The change must be
-    /// certain: the search has ended without success, or the new neighbour is linked.
+    /// Returns true if the neighbour has changed since the last decision on a view. The change must be certain: the
+    /// search has ended without success, or the new neighbour is linked.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Returns true if the selected neighbour is also the neighbour in the agreed view. A view is the agreed list of
-    /// the chain's members.
+    /// Returns true if the selected neighbour is also the neighbour in the agreed view.
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
 
-    /// Records where a view proposal came from: the neighbour on this side, or this relay itself. This relay makes a
-    /// proposal only if it has no neighbour toward the leader.
+    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. This relay proposes
+    /// only if it has no neighbour toward the leader.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// Records that a view proposal was granted. The neighbour that sent it becomes this side's neighbour in the
-    /// view.
+    /// Records that a view proposal was granted. Its sender becomes this side's neighbour in the view.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
 
-    /// Leaves the view: this side no longer has a neighbour in an agreed view.
+    /// Leaves the view: this side has no neighbour in an agreed view any more.
     pub(crate) const fn leave(&mut self) {
         self.agreed.agree(0);
     }
 
-    /// Records that a view proposal was refused. This side then requests no new view until its neighbour changes.
+    /// Records that a view proposal was refused. This side requests no new view until its neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that a view proposal was granted, on the side to which it was forwarded. If `ends` is true, the chain
-    /// ends at this relay, and this side has no neighbour in the view.
+    /// Records that a view proposal was granted, on the side toward the last relay. If `ends` is true, this relay is
+    /// the last one of the view and has no neighbour there.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Neighbour on one side according to the last decisions on views: node numbers, 0 for none. A view is the agreed
-/// list of the chain's members.
+/// Neighbour on one side according to the last decisions on views; 0 for none. A view is the agreed list of the chain's
+/// members.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
-    /// Neighbour in the agreed view (agreed members of the chain).
+    /// Neighbour in the agreed view.
     in_view: u16,
-    /// Neighbour at the last decision on a view proposal, whether the proposal was granted or refused.
+    /// Neighbour at the last decision on a view, granted or refused.
     counted: u16,
-    /// Node from which the last view proposal was received; 0 if this relay made it.
+    /// Node that sent the last view proposal; 0 if this relay made it.
     proposer: u16,
 }
 
@@ -592,7 +596,7 @@ impl AgreedNodes {
         };
     }
 
-    /// Records that a view proposal was granted, and that its sender is the neighbour on this side.
+    /// Records that a view proposal was granted. Its sender is the neighbour on this side.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
@@ -608,12 +612,11 @@ impl AgreedNodes {
     }
 }
 
-/// Heartbeat that must be sent to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PendingHeartbeat {
     /// True if a heartbeat request to the neighbour is pending.
     pub(super) request: bool,
-    /// Number of the neighbour's heartbeat request that must be answered, 0 for none.
+    /// Number of the neighbour's heartbeat request to answer; 0 for none.
     pub(super) reply: u16,
 }
 
@@ -624,12 +627,12 @@ impl PendingHeartbeat {
     };
 }
 
-/// Number of consecutive hellos without this relay in their list, after which their sender is reported. A hello lists
-/// the nodes that its sender receives. This relay receives the sender, but the sender does not seem to receive this
-/// relay. A smaller number is possibly due to one or two lost frames.
+/// Number of consecutive hellos after which their sender is reported as not receiving this relay.
+///
+/// A smaller number is possibly due to lost frames.
 const NOT_RECEIVED: u8 = 8;
 
-/// Number of consecutive handshakes of a node with another key after which the node is reported.
+/// Number of consecutive handshakes with another key after which their node is reported.
 const FORGED: u8 = 3;
 
 impl Neighbour {
@@ -677,15 +680,13 @@ impl Neighbour {
         }
     }
 
-    /// Returns the neighbour that a node on this side has selected in the direction of this relay. 0 for none; the
-    /// node is `distance` relays away.
+    /// Returns the neighbour that the node `distance` relays away has selected toward this relay. 0 for none.
     pub(crate) fn selected_by(&self, distance: u16) -> u16 {
         let known = self.selection.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` relays away. `taken` is true if this node is the selected
-    /// neighbour.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if it is the neighbour.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -702,35 +703,35 @@ impl Neighbour {
         }
     }
 
-    /// Returns the nodes received recently, as a bit mask; bit 0 is the nearest node. Nodes whose links are held
-    /// down, because they flap, are left out.
+    /// Returns a bit mask of the recently received nodes; bit 0 is the nearest node. Nodes with links that are held
+    /// down because they flap are left out.
     pub(crate) fn received_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         let held = self.damping.held_down_nodes(now, settings);
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Records a report of the node `distance` relays away. `received` is true if the node receives this relay.
-    /// Returns true, once, when [`NOT_RECEIVED`] reports in a row state that the node does not receive this relay.
+    /// Records whether the node `distance` relays away receives this relay (`received`). Returns true once, after
+    /// [`NOT_RECEIVED`] reports in a row that it does not.
     pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
         self.not_received.count(distance, !received, NOT_RECEIVED)
     }
 
-    /// Returns true if the mission mismatch of the node `distance` relays away must be reported now.
+    /// Returns true if another mission of the node `distance` relays away must be reported now.
     ///
-    /// The mismatch is reported at most once a minute for each node.
+    /// This is reported at most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.refusals.add_mission(distance, now)
     }
 
     /// Returns the distances of the nearest nodes with another mission and with another key; 0 for none.
     ///
-    /// A refusal counts for one to two minutes. Only nodes nearer than `end` relays away count.
+    /// A refusal counts for one to two minutes. Only nodes fewer than `end` relays away count.
     pub(crate) fn refused(&self, now: Instant, end: u16) -> [u16; 2] {
         self.refusals.nearest(now, end)
     }
 
-    /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true, once,
-    /// when [`FORGED`] such handshakes were received in a row.
+    /// Counts a handshake with another key from the node `distance` relays away. Returns true once, after [`FORGED`]
+    /// such handshakes in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16, now: Instant) -> bool {
         let is_news = self.forged.count(distance, true, FORGED);
         if TELEMETRY && self.forged.has(distance, FORGED) {
@@ -739,8 +740,7 @@ impl Neighbour {
         is_news
     }
 
-    /// Resets the count of handshakes with another key, because the node has used the right key now. The node is
-    /// `distance` relays away.
+    /// Resets the count of handshakes with another key. The node `distance` relays away has used the right key now.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
         self.refusals.remove_key(distance);
@@ -748,23 +748,23 @@ impl Neighbour {
 }
 
 impl Neighbour {
-    /// Records the number of a heartbeat request of the neighbour, 0 for none. The next heartbeat answers this
-    /// request.
+    /// Records the number of the neighbour's heartbeat request; 0 for none. The next heartbeat answers it.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.heartbeat.reply = number;
         }
     }
 
-    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent. `None` if the
+    /// Returns the time at which the heartbeat request `number` was sent. Called when its reply arrives. `None` if the
     /// request is too old.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is the number
-    /// of this relay's request to the neighbour. The second number is the number of the neighbour's request that the
-    /// heartbeat answers. `None` if no heartbeat is pending.
+    /// Returns the pending heartbeat; `None` if none is pending.
+    ///
+    /// The values are: destination node, number of this relay's request, and number of the neighbour's request that is
+    /// answered. A number 0 means none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {
@@ -778,13 +778,13 @@ impl Neighbour {
         Some((self.node, number, reply))
     }
 
-    /// Schedules a hello to the node `distance` relays away; if `ask` is true it requests an answer.
+    /// Schedules a hello to the node `distance` relays away. If `ask` is true, it requests an answer.
     pub(crate) const fn schedule_hello(&mut self, distance: u16, ask: bool) {
         self.hellos.schedule(distance, ask);
     }
 
-    /// Returns the distance, in relays, of the nearest node with a pending hello, and marks it as sent. The second
-    /// value is true if the hello requests an answer. `None` if no hello is pending.
+    /// Returns the distance of the nearest node with a pending hello, and marks the hello as sent. The distance is in
+    /// relays. The second value is true if the hello requests an answer. `None` if no hello is pending.
     pub(crate) fn poll_hello(&mut self) -> Option<(u16, bool)> {
         self.hellos.poll()
     }

@@ -1,7 +1,7 @@
-//! State of a relay's part in a round of agreement: the current pass, its position and its target.
+//! State of one relay during an agreement on positions: current pass, own position and target SIR.
 //!
-//! All passes share this state, so it has the state of each kind of pass, and the leader's task. The files of the passes have their
-//! handlers.
+//! A pass is a message along the chain whose result comes back. All kinds of passes share this state, which also has
+//! the leader's current task. The files of the passes have their handlers.
 
 use super::state::{Action, Phase, RoundState};
 use crate::features::{ADJUST, ALTITUDE, SENSING};
@@ -24,7 +24,7 @@ use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 use core::task::Poll;
 
-/// Kind and data of the current pass (message along the chain) at this relay.
+/// Kind and data of the current pass along the chain.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(SweepPass),
@@ -36,23 +36,23 @@ pub(super) enum PassKind {
 /// Position that the joint method has computed for this relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
-    /// Lateral offset and altitude of the position that this relay computed.
+    /// Lateral offset and altitude that this relay has computed for itself.
     pub(super) cross_section: CrossSection,
-    /// Largest allowed x of this relay, m. Beyond this x the later relays could not keep the minimum separation. Not
-    /// used in an interference field.
+    /// Largest allowed x of this relay, m. Beyond it the later relays could not keep the minimum separation. Unused in
+    /// an interference field.
     pub(super) end_m: f32,
-    /// True for a plain pass: every relay takes the farthest x that meets the target SIR. False if relays are allowed
-    /// to stop before that x, to help the next hop.
+    /// True if every relay takes the farthest x that meets the target SIR. False if relays may stop before that x to
+    /// help the next hop.
     pub(super) plain: bool,
 }
 
-/// Time slots of this relay that are as long as its hops need; unused if all slots are equal.
+/// Time slots of this relay, each as long as its hop needs. Unused if all slots are equal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
-    /// x of this relay in its joint solution, m, and its slots at this x, as shares of the frame. `None` without a
+    /// The relay's x in its joint solution, m, and its slots there, as fractions of the frame. `None` without a
     /// solution.
     pub(super) solved: Option<(f32, SlotShares)>,
-    /// Begin and end of this relay's slots at the agreed positions, as shares of the frame. `None` without an
+    /// Start and end of this relay's slots at the agreed positions, as fractions of the frame. `None` without an
     /// agreement.
     pub(super) agreed: Option<SlotShares>,
 }
@@ -64,44 +64,42 @@ impl FittedSlots {
     };
 }
 
-/// State of one relay in the placement algorithms: current pass, own position, and the leader's task.
+/// State of one relay in the placement algorithms: current pass, own position, and task as the leader.
 #[derive(Clone, Debug)]
 pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True from the start of a pass by this relay until the statistics count it. A pass is a message along the
-    /// chain.
+    /// True from the start of a pass along the chain until the statistics count it.
     pub(super) began: bool,
-    /// Altitude and transmit power that the mission gives to this relay.
+    /// Altitude and transmit power of this relay in the mission.
     pub(super) profile: Profile,
-    /// Profiles (altitude and power) of the relays of this view, collected by a message along the chain.
+    /// Altitudes and powers of the relays of this view, as collected along the chain.
     pub(super) seats: Seats,
-    /// Position that the joint method has computed for this relay in this view. `None` until the position is
-    /// computed.
+    /// Position computed for this relay by the joint method; `None` until it is computed.
     pub(super) chosen: Option<JointPlace>,
-    /// Lateral offset and altitude of the position that the chain has agreed on for this relay.
+    /// Lateral offset and altitude that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
-    /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. Algorithm 2 uses it as
+    /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. Algorithm 2 uses them as
     /// the end of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Fitted time slots of this relay; the array is empty without the feature `altitude`.
+    /// Fitted time slots of this relay. Empty without the feature `altitude`.
     pub(super) fitted: [FittedSlots; ALTITUDE as usize],
-    /// Average of the measured interference at the agreed position. Used only if the interference is a field (a known
-    /// distribution along x).
+    /// Average of the interference measured at the agreed position. Used only if the interference is known as a
+    /// function of x (a field).
     pub(super) meter: Meter,
     /// Measurements of the unknown interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// Upper bound of the worst hop's SIR for any positions at the configured altitudes, linear. `None` at other
-    /// relays than the leader, and until the bound is known.
+    /// Upper bound of the worst hop's SIR at the configured altitudes, linear, for any x. `None` except at the leader,
+    /// and until it is known.
     pub(super) bound: Option<f32>,
 }
 
 impl Computation {
-    /// Creates the state of the placement algorithms after a start. The leader is in the phase `Planning`, and counts
-    /// its passes from `number`.
+    /// Creates the state of the placement algorithms at a start. A leader starts in the phase `Planning`, and numbers
+    /// its passes along the chain from `number`.
     pub(crate) const fn new(
         leader: bool,
         number: u16,
@@ -128,8 +126,8 @@ impl Computation {
         }
     }
 
-    /// Returns true until this relay starts a task, takes part in a pass, or agrees on a position. A pass is a
-    /// message along the chain.
+    /// Returns true until this relay starts a task, takes part in a pass, or agrees on a position. A pass is a message
+    /// along the chain.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::Idle) && self.agreed_place.is_none()
@@ -151,10 +149,10 @@ impl Computation {
         self.after = None;
     }
 
-    /// Restarts the leader's search for the best target SIR from its first step.
+    /// Restarts the leader's search for the best target SIR.
     pub(crate) fn restart(&mut self) {
         self.task.clear();
-        // A new solution makes the leader try the same targets as the first time.
+        // With a new joint solution the leader tries the same targets as the first time.
         self.chosen = None;
         self.state.plan();
     }
@@ -165,10 +163,10 @@ impl Computation {
         self.state.answer();
     }
 
-    /// Resets the computation for a new view (membership of the chain). `leads` is true at its leader.
+    /// Resets the computation for a new view. `leads` is true at the view's leader.
     pub(crate) fn renew(&mut self, leads: bool) {
         self.task.clear();
-        // They belong to the previous view's mission and hops.
+        // The slots belong to the mission and the hops of the previous view.
         self.set_slot_shares(None);
         self.after = None;
         self.chosen = None;
@@ -177,17 +175,17 @@ impl Computation {
         self.state.renew(leads);
     }
 
-    /// Sets the agreed position to `place`, and its lateral offset and altitude to `cross_section`.
+    /// Sets the agreed position to `place`, and the agreed lateral offset and altitude to `cross_section`.
     #[inline(never)]
     pub(super) fn agree_on(&mut self, place: Placement, cross_section: CrossSection) {
         self.agreed_place = Some(place);
         self.cross_section = cross_section;
-        // Samples of the previous position do not count.
+        // Samples at the previous position must not be used.
         self.meter.restart();
     }
 
-    /// Returns the shares of this relay's slots at the agreed positions. `None` unless the slots were fitted (each
-    /// slot as long as its hop needs).
+    /// Returns this relay's slots at the agreed positions, as fractions of the frame. `None` unless each slot is as
+    /// long as its hop needs.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         self.fitted.first()?.agreed
     }
@@ -203,8 +201,8 @@ impl Computation {
         self.began = true;
     }
 
-    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`; with
-    /// `None`, the search's own first targets. `last` is true if no other algorithm follows.
+    /// Starts the search for the highest feasible target SIR with the targets in `ladder`. `None` stands for the usual
+    /// first targets. `last` is true if no other algorithm follows.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,
@@ -214,8 +212,9 @@ impl Computation {
         self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
-    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if
-    /// no target is feasible at the lateral offsets and altitudes of the joint method.
+    /// Starts the search for the target SIR at the configured lateral offsets and altitudes.
+    ///
+    /// It follows if no target is feasible at those of the joint method.
     pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }
@@ -242,7 +241,7 @@ impl Computation {
         Action::Infeasible
     }
 
-    /// Returns the message of the current pass for the next relay along the chain. `None` if the pass has ended, or
+    /// Returns the message of the current pass along the chain for the next relay. `None` if the pass has ended, or
     /// while this relay computes.
     pub(crate) fn onward(&self, context: &Context<'_>) -> Option<Message> {
         if self.state.phase() != Phase::Waiting {
@@ -277,7 +276,7 @@ impl Computation {
         }
     }
 
-    /// Returns true if each relay computes for long before it forwards the current pass along the chain.
+    /// Returns true if each relay computes for long before it forwards the current message along the chain.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
@@ -286,7 +285,8 @@ impl Computation {
         }
     }
 
-    /// Returns the reply to the previous relay, with the result of the pass. `None` until the result is known.
+    /// Returns the reply to the previous relay, with the result of the pass along the chain. `None` until the result is
+    /// known.
     pub(crate) fn back(&self, context: &Context<'_>) -> Option<Message> {
         if !self.state.is_answered() {
             return None;
@@ -331,9 +331,8 @@ impl Computation {
         }
     }
 
-    /// Returns this relay's lateral offset, altitude and power for a sweep. A sweep is a pass along the chain that
-    /// tries target SIRs. If `chosen` is true, offset and altitude are from the joint method, otherwise they are the
-    /// configured values.
+    /// Returns this relay's lateral offset, altitude and power for trying target SIRs. If `chosen` is true, offset and
+    /// altitude are those of the joint method, otherwise the configured ones.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -345,7 +344,7 @@ impl Computation {
         }
     }
 
-    /// Returns the number of completed rounds of Algorithm 2, and the SIR after the last round. `None` except at the
+    /// Returns the number of completed rounds of Algorithm 2, and the SIR after the last one. `None` except at the
     /// leader.
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         match &self.task {
@@ -355,7 +354,7 @@ impl Computation {
     }
 }
 
-/// Solver of the joint method (all positions at once) for up to [`MOST_SOLVED`] relays.
+/// Solver of the joint method for all positions at once, for up to [`MOST_SOLVED`] relays.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// Current task of the leader: prediction, joint method, search for the target SIR, or Algorithm 2.
@@ -370,29 +369,28 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 pub(crate) enum LeaderTask {
     /// No task: this relay is not the leader, has not started, or has finished.
     Idle,
-    /// Prediction of the chain's target SIR from the mission; the first sweep tries targets around it.
+    /// Prediction of the target SIR from the mission. The first targets to try are around it.
     Predicting(Planner),
-    /// Solution of the whole chain by the joint method. Every relay computes it for itself.
+    /// Solution of the whole chain by the joint method. Every relay computes it.
     Solving(ChainSolver),
-    /// Search for the highest target SIR that the chain meets, by sweeps (messages along the chain). The lateral
-    /// offsets and altitudes stay as they are.
+    /// Search for the highest target SIR that the chain meets at fixed lateral offsets and altitudes.
     Searching {
         search: Search,
-        /// True if this search is the last step of the configured method; no other algorithm follows.
+        /// True if no other algorithm follows this search.
         last: bool,
-        /// True while the relays search at the configured altitudes. They do so because no target is feasible at the
-        /// joint method's altitudes.
+        /// True for a search at the configured altitudes. The reason is that no target is feasible at those of the
+        /// joint method.
         given: bool,
     },
-    /// Algorithm 2 is running: the state of its rounds.
+    /// Algorithm 2, in which the relays move one after the other.
     Adjusting(Rounds),
 }
 
-/// Progress of Algorithm 2, in which the relays move one after the other: rounds and SIR.
+/// Progress of Algorithm 2: number of rounds, and SIR of the chain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
-    /// Number of completed rounds. The first pass, in which no relay moves, does not count.
+    /// Number of completed rounds. The first pass of the token, in which no relay moves, does not count.
     done: u16,
     turn: AdjustStep,
     /// SIR of the chain's worst hop after the last round, linear.
@@ -417,8 +415,8 @@ impl Rounds {
         self.done
     }
 
-    /// Records the result of a pass of Algorithm 2; returns true if it was the last pass. `any` is true if a relay
-    /// has moved; `sir` is the SIR of the chain's worst hop, linear.
+    /// Records the result of a pass of the token. Returns true if it was the last one. `any` is true if a relay has
+    /// moved. `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -450,14 +448,14 @@ impl LeaderTask {
         *self = Self::Predicting(planner);
     }
 
-    /// Starts the joint method with a new solver, whose first step is still to come.
+    /// Starts the joint method with a new solver.
     #[inline(never)] // or the stack of each step has room for a second solver
     pub(crate) fn solve(&mut self) {
         *self = Self::Solving(ChainSolver::NEW);
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
-    /// true if the relays keep the configured altitudes, because the joint method found no altitudes.
+    /// true for a search at the configured altitudes, because the joint method found none.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -471,29 +469,30 @@ impl LeaderTask {
     }
 }
 
-/// State of a sweep of target SIRs at one relay.
+/// State of one relay in a sweep: a pass along the chain that tries several target SIRs.
 #[derive(Clone, Debug)]
 pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
-    /// Checksum of the previous relay's data in the sweep, to recognise duplicates; see [`fingerprint`].
+    /// Checksum of the previous relay's data, to recognise duplicates; see [`fingerprint`].
     pub(crate) fingerprint: u32,
-    /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
+    /// True if the relays use the lateral offsets and altitudes of the joint method.
     pub(crate) chosen: bool,
-    /// True if a later relay on this pass has a power or fixed altitude that differs from the mission's.
+    /// True if a later relay has a power or fixed altitude that differs from the mission's. Later means in the
+    /// direction of the pass.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
+    /// Farthest x at which the previous node meets each target SIR, m. It is the farthest in the direction of the
+    /// sweep.
     from: PerTarget,
-    /// Reaches of this relay, one for each target SIR, m. A reach is the farthest x in the direction of the pass at
-    /// which the relay meets the target.
+    /// Farthest x at which this relay meets each target SIR, m. It is the farthest in the direction of the sweep.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
-    /// x of this relay for the target SIR that was committed, m; `None` if no target was committed.
+    /// The relay's x for the committed target SIR, m; `None` if no target is committed.
     place: Option<f32>,
-    /// x that the previous relay must take for the target SIR that was committed, m. `None` if the previous relay
-    /// takes the farthest x that meets the target.
+    /// x that the previous relay must take for the committed target SIR, m. `None` if that is its farthest x for the
+    /// target.
     required_x_m: Option<f32>,
 }
 
@@ -517,8 +516,8 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep with the data of its sender, the node before this relay on the pass. `behind` describes the
-    /// sender; `None` if it is Tx or Rx. `from` has the sender's farthest x for each target, m.
+    /// Starts a sweep with the data of the previous node. `behind` describes this node; `None` if it is Tx or Rx.
+    /// `from` is its farthest x for each target, m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -530,10 +529,10 @@ impl SweepPass {
         self.required_x_m = None;
     }
 
-    /// Continues the computation of this relay's farthest x for each target. The last relay also decides the verdict:
-    /// the result of the sweep, and the committed target if any. Returns true when the computation is complete.
+    /// Continues the computation of this relay's farthest x for each target. Returns true when it is complete. The last
+    /// relay then also decides which target is committed, if any.
     ///
-    /// Work: at most 16 targets; in a field of interference 128 points of the field, or one target.
+    /// Work: at most 16 targets; in an interference field 128 points of the field, or one target.
     pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
         let link = self.link(link);
         let targets = self.ladder.targets();
@@ -549,8 +548,8 @@ impl SweepPass {
         self.done
     }
 
-    /// Accepts a verdict, the result of a sweep, if this relay has a position for the committed target. Returns true
-    /// if the verdict was accepted.
+    /// Accepts the result of a sweep if this relay has a position for the committed target. Returns true if it was
+    /// accepted.
     pub(crate) fn apply_sweep_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
@@ -578,8 +577,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from `place` the x that the previous
-    /// relay must take. If there is no such x, or `place` is `None`, the commitment is revoked.
+    /// Stores this relay's x for the committed target SIR, `place`, m. From it follows the x that the previous relay
+    /// must take. If there is no such x, or `place` is `None`, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
@@ -603,8 +602,8 @@ impl SweepPass {
         }
     }
 
-    /// Returns the target SIR that was committed, and the farthest x, m, at which this relay meets it. `None` if no
-    /// target was committed.
+    /// Returns the committed target SIR, and the farthest x at which this relay meets it, m. `None` if no target is
+    /// committed.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((
@@ -613,7 +612,7 @@ impl SweepPass {
         ))
     }
 
-    /// Returns the farthest x, m, at which the previous node meets the committed target SIR. `None` if no target is
+    /// Returns the farthest x at which the previous node meets the committed target SIR, m. `None` if no target is
     /// committed.
     fn committed_before(&self) -> Option<f32> {
         self.from.get(usize::from(self.verdict.commit?)).copied()
@@ -641,8 +640,9 @@ impl SweepPass {
     }
 }
 
-/// Returns a checksum of the data of a sweep's sender. `behind` is `None` if the pass starts at this relay, next to Tx
-/// or Rx. The checksum distinguishes a duplicate from a sweep that a restarted relay sends with other data.
+/// Returns a checksum of the previous node's data in a sweep. `behind` is `None` if that node is Tx or Rx.
+///
+/// The checksum distinguishes a duplicate from a sweep that a restarted relay sends with other data.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {
@@ -659,14 +659,14 @@ pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
 /// State of one relay while the token of Algorithm 2 travels along the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Action of this pass of Algorithm 2: look, move or stop.
+    /// Task of the relays in this pass of the token: look, move or stop.
     pub(crate) turn: AdjustStep,
-    /// SIR of the chain's worst hop before this pass of Algorithm 2, linear.
+    /// SIR of the chain's worst hop before this pass of the token, linear.
     pub(crate) sir: f32,
-    /// Position and power of the previous relay, from which the hop to this relay starts; `None` for Tx.
+    /// Position and power of the previous relay, the start of the hop to this relay; `None` for Tx.
     pub(super) before: Option<HopEnd>,
     search: Option<LocalSearch>,
-    /// True if this relay or a later relay has moved in this pass of Algorithm 2.
+    /// True if this relay or a later one has moved in this pass of the token.
     pub(crate) any: bool,
     /// Worst SIR of the hops between this relay and Rx, linear.
     pub(crate) worst: f32,
@@ -684,8 +684,8 @@ impl TurnPass {
         }
     }
 
-    /// Starts a search for a better position around `at`. `band` has the lowest and the highest altitude, m. Returns
-    /// false if relays do not move in this pass.
+    /// Starts a search for a better position around `at`. `band` is the lowest and the highest altitude, m. Returns
+    /// false if relays do not move in this pass of the token.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
@@ -695,8 +695,7 @@ impl TurnPass {
 
     /// Continues the search: evaluates `budget` positions, and then the rest of the last grid row.
     ///
-    /// Returns `Ready` at the end of the search: with a position that is better than the relay's present one, or with
-    /// `None` if there is no better position.
+    /// Returns `Ready` at the end of the search, with the better position, or with `None` if there is none.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);
@@ -714,13 +713,13 @@ impl TurnPass {
     }
 }
 
-/// Altitudes and transmit powers of the relays of the view, as far as they are known.
+/// Altitudes and transmit powers of the view's relays, as far as they are known.
 #[derive(Clone, Debug)]
 pub(super) struct Seats {
-    /// Number of relays, from Tx on, whose profiles are known. `None` before the first pass that collects profiles.
+    /// Number of relays whose profiles are known, counted from Tx. `None` before the first collection of profiles.
     pub(super) known: Option<u16>,
-    /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it; the power is 0 for a
-    /// relay with the mission's common profile.
+    /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it. The power is 0 if the relay
+    /// has the mission's common profile.
     own: [[f32; 2]; MOST_SOLVED],
 }
 
@@ -730,8 +729,7 @@ impl Seats {
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// Returns the profile of relay `index`. It is its own profile if this was collected, otherwise the mission's
-    /// common profile.
+    /// Returns the collected profile of relay `index`, or the mission's common profile if it has no other.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);
@@ -747,13 +745,12 @@ impl Seats {
         }
     }
 
-    /// Returns true if the collection of profiles has begun, but some of the `relays` profiles are missing.
+    /// Returns true if some of the `relays` profiles were collected, but not all.
     pub(super) fn is_partial(&self, relays: u16) -> bool {
         self.known.is_some_and(|known| known < relays)
     }
 
-    /// Stores the profiles in `roster`, the result of a pass along `relays` relays. Returns true if all profiles are
-    /// now known.
+    /// Stores the profiles in `roster`, collected from `relays` relays. Returns true if all profiles are now known.
     pub(super) fn adopt(&mut self, roster: &Roster, relays: u16) -> bool {
         for seat in &roster.seats {
             let at = usize::from(seat.index).wrapping_sub(1);

@@ -1,10 +1,10 @@
 //! Collection of the relays' profiles for the joint method.
 //!
-//! A roster has room for a few relays. A relay whose profile differs from the mission's common one appends it while there is
-//! room, and the result of the pass informs all relays. After a full roster the next pass continues with the relay after the
-//! roster's last one.
+//! A profile is a relay's altitude and power. A roster has room for a few profiles. A relay whose profile differs from
+//! the mission's common one appends it while there is room. The result of the pass informs all relays. After a full
+//! roster the next pass continues with the relay after the roster's last one.
 //!
-//! Then each relay solves the whole chain without further messages, and uses its own position in the solution.
+//! Then each relay solves the whole chain without further messages, and uses its position in the solution.
 
 use super::computation::{Computation, JointPlace, LeaderTask, PassKind, Seats};
 use super::state::Action;
@@ -18,7 +18,7 @@ use crate::wire::message::{OwnSeat, OwnSeats, Roster};
 use core::task::Poll;
 
 impl Computation {
-    /// Returns this relay's profile: its power, and the lateral offsets and altitudes that it may take.
+    /// Returns this relay's profile: its power, and its possible lateral offsets and altitudes.
     pub(super) fn seat(&self, context: &Context<'_>) -> Seat {
         let holds = context.settings().hold_altitude;
         Seat::of(context.mission(), self.profile, holds)
@@ -29,8 +29,8 @@ impl Computation {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Returns true if the leader's next pass must collect the relays' profiles (altitude and power). This is so if a
-    /// relay's profile differs from the common profile, and not all profiles are known.
+    /// Returns true if the leader must collect profiles (altitude and power) next. This is so if a relay's profile
+    /// differs from the common one, and not all profiles are known.
     pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
@@ -42,14 +42,14 @@ impl Computation {
             }
     }
 
-    /// Starts a pass from the leader along the chain that collects the relays' altitudes and powers. Only a relay
-    /// whose profile (altitude and power) differs from the mission's common profile adds its profile to the message.
+    /// Starts a pass along the chain that collects the relays' profiles (altitude and power). Only a profile that
+    /// differs from the mission's common one is added to the message.
     pub(super) fn begin_gathering(&mut self, context: &Context<'_>) -> Action {
         let after = self.seats.known.unwrap_or(0);
         self.gather(context, after, OwnSeats::new())
     }
 
-    /// Handles a pass that collects the relays' profiles, received from the previous relay.
+    /// Handles a message from the previous relay that collects the relays' profiles.
     pub(crate) fn on_gather(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let own = context.index();
         let same = matches!(&self.pass, PassKind::Gather(known) if known.after == roster.after
@@ -63,7 +63,7 @@ impl Computation {
             return Action::Stale;
         }
         if roster.after > 0 && self.seats.known != Some(roster.after) {
-            // This relay missed the pass with the earlier profiles.
+            // This relay has missed the message with the earlier profiles.
             return Action::Foreign;
         }
         self.state.accept(roster.number);
@@ -99,7 +99,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// Handles the collected profiles of the relays, received from the next relay.
+    /// Handles the collected profiles, received from the next relay.
     pub(crate) fn on_gathered(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let relays = context.mission().relays();
         if let PassKind::Gather(known) = &mut self.pass
@@ -136,8 +136,7 @@ impl Computation {
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues to solve the chain by the joint method while this relay waits for a pass. A pass is a message along
-    /// the chain.
+    /// Continues the joint solution while this relay waits for the leader's message.
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -162,8 +161,8 @@ impl Computation {
         }
     }
 
-    /// Continues this relay's solution of the chain by the joint method. Returns the predicted target SIR, linear,
-    /// once the solution is complete; `None` before.
+    /// Continues this relay's joint solution of the chain. Returns the predicted target SIR, linear, once it is
+    /// complete; `None` before.
     ///
     /// If there is no solution, this relay uses its configured lateral offset and altitude, and the target is 0.
     #[inline(never)]
@@ -194,7 +193,7 @@ impl Computation {
                 Some((at, _)) => (at.cross_section(), true),
                 None => (chain.at(index, seat_of(index)), !chain.holds_back()),
             };
-            // The solver used the common profile, if this relay's own has not been collected yet.
+            // The solver used the common profile if this relay's own profile has not been collected yet.
             let cross_section = self.seat(context).room.nearest(solved);
             let fitted = fitted.map(|(at, shares)| (at.x_m, shares));
             self.chosen = Some(JointPlace {
@@ -230,7 +229,7 @@ impl Computation {
         });
     }
 
-    /// Starts the search for the highest target SIR, with the joint method's lateral offsets and altitudes. The first
+    /// Starts the search for the highest target SIR at the joint method's lateral offsets and altitudes. The first
     /// targets are around `target`, linear, unless it is 0.
     pub(super) fn search_chosen(
         &mut self,

@@ -1,4 +1,7 @@
-//! Rounds of agreement: passes along the chain and their results, for all algorithms.
+//! Agreement on positions: the leader's messages along the chain and their results.
+//!
+//! A *pass* is a message that the leader sends along the chain, and its result, which comes back. All algorithms
+//! consist of passes.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -9,13 +12,14 @@
 //! | `turn` | token of Algorithm 2 |
 //! | `sense` | collection of interference measurements, and the estimate |
 //!
-//! The passes import `computation`, which imports `state`; this file has the order of the passes: received messages, timers, and the
+//! The passes import `computation`, which imports `state`. This file handles received messages and timers, and has the
 //! leader's choice of the next pass.
 //!
-//! A reply proves that the neighbour was alive after this relay sent the message that it answers. The result of a pass proves it
-//! for the next relay, from the time at which the pass was first forwarded. The next pass proves it for the previous relay, from
-//! the time at which the last result was first sent. If the leader's firmware calls
-//! `Relay::restart`, the next pass begins before that result, and the previous relay takes a time that is up to one pass too late.
+//! A received message proves that a neighbour was alive after a certain time. For the next relay, the proof is the
+//! result of a pass, and the time is that of the pass's first transmission. For the previous relay, the proof is the
+//! next pass, and the time is that of the last result's first transmission. If the leader's firmware calls
+//! `Relay::restart`, the next pass begins before that result. The time for the previous relay is then up to one pass
+//! too late.
 
 mod computation;
 mod gathering;
@@ -52,8 +56,8 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// Creates the state of the agreement on positions after a start. `leads` is true at the leader, which counts its
-    /// passes from `number`.
+    /// Creates the state of the agreement on positions at a start. `leads` is true at the leader, which numbers its
+    /// passes along the chain from `number`.
     pub(crate) const fn new(
         leads: bool,
         number: u16,
@@ -69,8 +73,8 @@ impl Round {
         }
     }
 
-    /// Handles a message of the current mission and view. A pass message comes from the previous relay, a reply from
-    /// the next one. Work: at most the computation of this relay's positions for 16 target SIRs.
+    /// Handles a message of the current mission and view. A message from the leader comes from the previous relay, a
+    /// reply from the next one. Work: at most the computation of this relay's positions for 16 target SIRs.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let before = computation.state;
@@ -137,8 +141,8 @@ impl Round {
         }
     }
 
-    /// Carries out `next`, the action of the agreement on positions. Returns the effects on the other layers. They
-    /// include the sensing results that differ from `before`.
+    /// Carries out the action `next`, and returns the effects on the other layers. They include the sensing results
+    /// that differ from `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -179,7 +183,7 @@ impl Round {
             Action::Answer { agreed } => {
                 let path = context.path_to_leader();
                 self.circulation.complete(context.now, path);
-                // With the collected profiles the joint solution can start.
+                // All profiles are known, so the joint solution can start.
                 self.work_at = None;
                 if self.computation.is_solving(context) {
                     self.work_soon(context.now);
@@ -212,12 +216,12 @@ impl Round {
         self.computation.meter.take(&member.mission, at, sample)
     }
 
-    /// Schedules the next step of a computation after a pause, so that the caller can do other work.
+    /// Schedules the next step of a computation after a pause, in which the caller can do other work.
     pub(crate) fn work_soon(&mut self, now: Instant) {
         self.work_at = Some(now + PAUSE);
     }
 
-    /// Cancels the next step of a computation. The first leader thus starts no pass if it leaves the chain before.
+    /// Cancels the next step of a computation, so that a leader that leaves the chain sends no new message.
     pub(crate) const fn cancel_work(&mut self) {
         self.work_at = None;
     }
@@ -234,8 +238,8 @@ impl Round {
         self.work_at = None;
     }
 
-    /// Resets the agreement on positions for a new view at `now`; `leads` is true at its leader. `works` is true if
-    /// this relay starts to compute at once, as every relay does in the joint method.
+    /// Resets the agreement on positions for a new view at `now`. `leads` is true at its leader. `works` is true if
+    /// this relay computes at once, as in the joint method.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -243,23 +247,23 @@ impl Round {
         }
     }
 
-    /// Loads another mission, in which this relay has `profile`. The agreed position is kept.
+    /// Loads another mission with the profile `profile` of this relay. The agreed position is kept.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.computation.load(profile);
     }
 
-    /// Discards the agreed position. The relay has no agreed position until the next agreement.
+    /// Discards the agreed position. The relay has none until the next agreement.
     pub(crate) fn discard_agreed_place(&mut self) {
         self.computation.discard_agreed_place();
     }
 
-    /// Schedules a retransmission of an outstanding pass message. Called when the next relay is reachable after a loss.
+    /// Schedules a retransmission of a message that awaits its reply. Called when the next relay is reachable again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
 
-    /// Returns the pending message of a pass along the chain, and starts its retransmission timer. `None` if there is
-    /// none, or if `reachable` is false: the next relay cannot be reached.
+    /// Returns the pending message for the next relay, and starts its retransmission timer. `None` if none is pending,
+    /// or if `reachable` is false (there is no next relay to receive it).
     pub(crate) fn poll_onward(
         &mut self,
         context: &Context<'_>,
@@ -272,8 +276,8 @@ impl Round {
         reachable.then_some(message)
     }
 
-    /// Returns the pending reply to the previous relay and marks it as sent. `None` if no reply is pending, or if
-    /// `reachable` is false: the previous relay cannot be reached.
+    /// Returns the pending reply to the previous relay and marks it as sent. `None` if none is pending, or if
+    /// `reachable` is false (the previous relay cannot receive it).
     pub(crate) fn poll_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
         match self.circulation.poll_reply().filter(|_| reachable)? {
             Reply::Result => self.computation.back(context),
@@ -299,8 +303,7 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true until this relay has taken part in a pass or a view. A pass is a message along the chain, a view
-    /// the agreed list of the chain's members.
+    /// Returns true until this relay has taken part in a pass along the chain or in a view.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }
@@ -313,8 +316,8 @@ impl Round {
         self.computation.is_untouched()
     }
 
-    /// Returns the agreed position; `None` before an agreement. The guard (collision avoidance) may limit the
-    /// setpoint on the way to this position.
+    /// Returns the position that the chain has agreed on; `None` before an agreement. The setpoint can be another
+    /// position, because the guard (collision avoidance) limits it.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
     }
@@ -348,21 +351,22 @@ impl Round {
     }
 }
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs. If the
-/// interference varies along x, one call predicts only a part of one hop.
+/// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs.
+///
+/// If the interference varies along x, one call predicts only a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A field is a known
-/// distribution of the interference. A hop in a field takes twice as much computation as a hop with one interferer,
-/// for which the maximum is [`HOPS_AT_ONCE`].
+/// Maximum number of hops per call of [`Computation::work`] in a uniform interference field.
+///
+/// Such a hop takes twice as much computation as a hop with one interferer ([`HOPS_AT_ONCE`]).
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
-/// Choice of the leader's next pass, and the computation before this pass.
+/// Leader's choice of the next pass along the chain, and its computation before the pass.
 impl Computation {
-    /// Continues this relay's part in the current pass, or the leader's preparation of the next pass.
+    /// Continues the computation for the current pass along the chain, or for the leader's next one.
     ///
-    /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten
-    /// relays of the joint method, or 624 positions of Algorithm 2.
+    /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten relays
+    /// of the joint method, or 624 positions of Algorithm 2.
     fn work(&mut self, context: &Context<'_>) -> Action {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {
@@ -387,8 +391,8 @@ impl Computation {
         }
     }
 
-    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, and the
-    /// error `Infeasible` if no target SIR is feasible.
+    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, and an
+    /// error if no target SIR is feasible.
     fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
         if self.must_distribute(context) || self.must_gather(context) {
             return Ok(true);
@@ -423,7 +427,7 @@ impl Computation {
                 let ladder = match planner.step(mission, profile_of, hops) {
                     Ok(None) => return Ok(false),
                     Ok(Some(agreed)) => Some(agreed.ladder),
-                    // Other relays may have other profiles, so the search decides.
+                    // Other relays may have other profiles, so only the search can decide.
                     Err(Infeasible) => None,
                 };
                 let last = context.settings().method == Method::Align;

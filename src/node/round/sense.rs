@@ -1,4 +1,4 @@
-//! Sensing pass: collects measurements, and distributes the leader's estimate of the interference.
+//! Sensing pass: collects measurements along the chain, and distributes the interference estimate.
 //!
 //! | event at the leader | action |
 //! | --- | --- |
@@ -24,22 +24,21 @@ use crate::sensing::sums::{Level, Levels, Sums, terms};
 use crate::time::Duration;
 use crate::wire::message::Heard;
 
-/// Maximum interval between collections of measurements, as a multiple of [`Listen::every`].
+/// Maximum interval between two collections of measurements, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// Number of sensing passes without a change of the estimate after which their interval doubles. A sensing pass is a
-/// message along the chain that collects measurements.
+/// Number of collections without a change of the estimate after which their interval doubles. A collection gathers
+/// measurements along the chain.
 const PATIENCE: u8 = 4;
 
-/// Number of sensing passes per `Listen::every` in the leader's search for a faulty sensor. A sensing pass is a
-/// message along the chain that collects measurements.
+/// Number of collections of measurements per `Listen::every` in the search for a faulty sensor.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Number of consecutive measurements at or below the noise after which a sensor is possibly faulty.
+/// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
-    /// Returns true if the relays estimate the interference by measurements.
+    /// Returns true if the relays estimate the interference from measurements.
     pub(super) fn is_sensing_enabled(context: &Context<'_>) -> bool {
         SENSING && context.settings().listen.is_some() && context.mission().field().is_none()
     }
@@ -54,14 +53,14 @@ impl Computation {
                 .is_some_and(|sensor| !sensor.is_distributed)
     }
 
-    /// Returns true at a leader that is allowed to start a sensing pass, which collects measurements. The chain must
-    /// have agreed, or have no feasible target.
+    /// Returns true at a leader that may start a collection of measurements along the chain. The chain must have
+    /// agreed, or have no feasible target.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::is_sensing_enabled(context) && context.leads() && settled
     }
 
-    /// Starts the timer of the next pass that collects measurements, if this relay may start one.
+    /// Starts the timer of the next collection of measurements, if this relay may start one.
     pub(super) fn schedule_sensing(&mut self, context: &Context<'_>) {
         if let Some(listen) = context.settings().listen
             && self.may_sense(context)
@@ -72,7 +71,7 @@ impl Computation {
         }
     }
 
-    /// Starts a sensing pass at the leader: a message along the chain that collects all measurements.
+    /// Starts a sensing pass, which collects all measurements along the chain.
     pub(super) fn begin_sense(&mut self, context: &Context<'_>) -> Action {
         let Some(sensor) = self.sensing.sensor_mut() else {
             return Action::Nothing;
@@ -92,7 +91,7 @@ impl Computation {
         self.sense(context, hearing, holds)
     }
 
-    /// Handles a pass that collects measurements (sensing pass), received from the previous relay.
+    /// Handles a message of a sensing pass, which collects measurements, from the previous relay.
     pub(crate) fn on_sense(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         let same = matches!(&self.pass, PassKind::Sense(known)
             if known.hearing.estimate == hearing.estimate && known.from == hearing.sums);
@@ -114,13 +113,13 @@ impl Computation {
             return Action::Stale;
         };
         if hearing.estimate != sensor.estimate || !holds {
-            // Another estimate means other positions.
+            // With another estimate the positions will change.
             sensor.estimate = hearing.estimate;
             self.task.clear();
             self.chosen = None;
         }
         let mission = context.mission();
-        // The second exclusion in a row is final.
+        // A node that is excluded twice in a row stays excluded.
         let twice = hearing.excluded == sensor.left_out;
         sensor.named = if twice { hearing.excluded } else { 0 };
         sensor.left_out = hearing.excluded;
@@ -156,7 +155,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// Handles the result of a pass that collects measurements (sensing pass), from the next relay.
+    /// Handles the result of a sensing pass, which collects measurements, from the next relay.
     pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         if let (PassKind::Sense(known), Some(sensor)) = (&mut self.pass, self.sensing.sensor_mut())
             && self.state.is_awaited(hearing.number)
@@ -202,8 +201,8 @@ impl Computation {
         Action::Work
     }
 
-    /// Continues the leader's search for a faulty sensor with the measurements collected by a sensing pass. Returns
-    /// true if the search needs another pass; the estimate then stays unchanged.
+    /// Continues the leader's search for a faulty sensor with the collected measurements. Returns true if it needs
+    /// another collection. The estimate then stays unchanged.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -221,8 +220,8 @@ impl Computation {
         next == Next::Again
     }
 
-    /// Computes a new interference estimate from the result of a sensing pass. Returns true if the estimate has
-    /// changed and must be distributed.
+    /// Computes a new interference estimate from the collected measurements. Returns true if it has changed and must be
+    /// distributed.
     fn review_estimate(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -258,7 +257,7 @@ impl Computation {
         sensor.is_distributed = false;
         sensor.kept = 0;
         sensor.wait = match estimate {
-            // All three spreads have failed; relays that learn nothing shall move less and less often.
+            // All three spreads have failed. Relays that learn nothing should move less and less often.
             InterferenceEstimate::Unknown(Spread::Even) => (2 * sensor.wait).min(RAREST),
             InterferenceEstimate::Unknown(_) => sensor.wait,
             _ => 1,
@@ -268,12 +267,12 @@ impl Computation {
         true
     }
 
-    /// Checks this relay's sensor by comparison with the measurements of all other relays.
+    /// Compares this relay's sensor with the measurements of all other relays.
     ///
-    /// A relay whose measurement is absurd excludes itself. A relay that measures nothing, although the measurements of
-    /// the other relays predict interference at its position, is marked as deaf. A relay that excluded itself earlier
-    /// checks if its measurements now fit. Finally the relay adds its own sums to the result, unless it has just
-    /// excluded itself.
+    /// A relay whose measurement is absurd excludes itself. A relay counts as deaf if it measures nothing, although the
+    /// other relays' measurements predict interference at its position. A relay that excluded itself earlier checks
+    /// whether its measurements now fit. Finally the relay adds its sums to the result, unless it has just excluded
+    /// itself.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,

@@ -12,9 +12,10 @@
 //! | `Holding` | compute, forward; `Waiting` | reply again | ignore as stale | - |
 //! | `Infeasible` (leader) | - | - | ignore as stale | - |
 //!
-//! The last relay is `Waiting` only while it computes its own part. The leader has no previous relay to reply to, and without an
-//! agreement it has work to do. A pass with a number just below the current one is stale in every phase. Only an agreement or a
-//! turn of Algorithm 2 changes the agreed position. In `Holding` and `Infeasible` the leader may still start a sensing pass.
+//! The last relay is `Waiting` only while it computes. The leader has no previous relay to reply to, and without an
+//! agreement it continues to compute. A pass with a number just below the current one is stale in every phase. Only an
+//! agreement or a move in Algorithm 2 changes the agreed position. In `Holding` and `Infeasible` the leader may still
+//! start a sensing pass.
 
 use crate::node::circulation::LateMessages;
 
@@ -22,21 +23,21 @@ use crate::node::circulation::LateMessages;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
-    /// Idle: this relay has not received a pass (message along the chain) yet.
+    /// No message of an agreement on positions has been received yet.
     Idle,
-    /// The leader computes the target SIRs of its next pass along the chain.
+    /// The leader computes the target SIRs that the chain tries next.
     Planning,
-    /// Waiting: a pass or view proposal has been forwarded, and its result is not known yet.
+    /// A message along the chain has been forwarded, and its result is not known yet.
     Waiting,
-    /// The last pass (message along the chain) has ended without an agreement on positions.
+    /// The last message along the chain has come back without an agreement on positions.
     Answered,
-    /// The chain has agreed on the positions, and this relay holds its own position.
+    /// The chain has agreed on the positions, and this relay holds its position.
     Holding,
     /// The leader has found that no target SIR is feasible. All relays keep their positions.
     Infeasible,
-    /// A new view (set of members) is proposed; passes wait for its decision.
+    /// A new view (list of members) is proposed. The agreement on positions waits for the decision.
     ViewChange,
-    /// Missing quorum: too few relays are reachable. The relays keep their positions.
+    /// A quorum is missing: too few relays are reachable. The relays keep their positions.
     NoQuorum,
 }
 
@@ -50,35 +51,35 @@ pub(crate) enum Action {
     Work,
     /// Continue the computation after a pause. A message that awaits a reply is kept.
     Think,
-    /// Forward the pass to the next relay, and retransmit it until there is a reply.
+    /// Forward the message to the next relay, and retransmit it until there is a reply.
     Forward,
-    /// Repeat the reply, because the received message is a duplicate of the current pass.
+    /// Repeat the reply, because the received message is a duplicate.
     Repeat,
-    /// Send the result of the pass (message along the chain) to the previous relay.
+    /// Send the result to the previous relay.
     Answer {
-        /// True if the pass ends with the agreement of the chain on its positions.
+        /// True if the result is the agreement of the chain on its positions.
         agreed: bool,
     },
-    /// Complete the pass at the leader. No further pass starts now.
+    /// Complete the leader's pass along the chain. No further pass starts now.
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view (membership), because this relay cannot take part in the leader's present pass.
+    /// Request a new view, because this relay cannot take part in the leader's pass along the chain.
     Foreign,
 }
 
-/// Class of a received pass message, by its number and its content: new, duplicate, late or foreign.
+/// Class of a received message of a pass along the chain: new, duplicate, late or foreign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Foreign: the pass's leader has restarted, or this relay has missed earlier passes.
+    /// Foreign: the leader has restarted, or this relay has missed earlier passes along the chain.
     Foreign,
 }
 
 impl Arrival {
-    /// Returns the action for a pass message that is not new. `None` for a new message, which must be handled.
+    /// Returns the action for a message that is not new; `None` for a new message, which must be handled.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -89,13 +90,12 @@ impl Arrival {
     }
 }
 
-/// Maximum number of passes by which a late message is allowed to be behind the current pass. A pass is a message along
-/// the chain. A message that is farther behind is foreign: its leader has restarted.
+/// Maximum number of passes along the chain by which a late message may be behind the current one. If it is farther
+/// behind, its leader has restarted.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of the numbers of first passes. The number of a first pass is a multiple of 64: the first pass of a view,
-/// or after a leader's start. No other pass has such a number. A relay can join a first pass without knowledge of
-/// earlier passes.
+/// Divisor of the numbers of first passes along the chain. The first pass of a view, or after a leader's start, has a
+/// multiple of 64. No other pass has such a number. A relay can join a first pass without knowledge of earlier passes.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.
@@ -103,7 +103,7 @@ const INCARNATION: u16 = 64;
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass has been started or received in this view. In the view loaded before flight, only passes
+    /// True once a pass along the chain has been started or received in this view. In the initial view, only passes
     /// since this relay's last start count.
     begun: bool,
     late_messages: LateMessages,
@@ -177,18 +177,18 @@ impl RoundState {
         }
     }
 
-    /// Accepts a new pass along the chain, with the number `number`, as the current pass.
+    /// Makes the new pass along the chain with the number `number` the current one.
     pub(crate) const fn accept(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a received pass message by its `number`. `same` is true if the message has the same content as the
-    /// current pass.
+    /// Classifies a received message by the `number` of its pass along the chain. `same` is true if its content equals
+    /// that of the current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
-            // A relay that has missed the first pass cannot join later ones; it requests a new view.
+            // A relay that has missed the first pass cannot join later ones, and requests a new view.
             return if number.is_multiple_of(INCARNATION) {
                 Arrival::New
             } else {
@@ -204,8 +204,8 @@ impl RoundState {
         }
     }
 
-    /// Counts a late pass message, and classifies it. Too many in a row count as foreign, because the leader must
-    /// have restarted.
+    /// Counts and classifies a late message. Too many in a row count as foreign, because the leader must have
+    /// restarted.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign
@@ -214,24 +214,24 @@ impl RoundState {
         }
     }
 
-    /// Returns true if `number` is the number of the current pass, and its result has not arrived yet.
+    /// Returns true if `number` is the current pass along the chain, and its result has not arrived yet.
     pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Returns true if the result of the current pass has arrived since the earlier state `before`.
+    /// Returns true if the result of the current pass along the chain has arrived since the state `before`.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass has started since the earlier state `before`. In the state `before` the result of
-    /// the last pass was known.
+    /// Returns true if a new pass along the chain has started since the earlier state `before`. In that state the
+    /// result of the last pass was known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }
 
-    /// Returns true if the result of the current pass is known, so that it can be sent as a reply.
+    /// Returns true if the result of the current pass along the chain is known and can be sent as a reply.
     pub(crate) fn is_answered(self) -> bool {
         matches!(self.phase, Phase::Answered | Phase::Holding)
     }
@@ -242,7 +242,7 @@ mod tests {
     use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
     use crate::node::circulation::SUSPICIOUS;
 
-    /// Returns the state of a relay that has accepted a pass (message along the chain) with the number 200.
+    /// Returns the state of a relay that has accepted the pass along the chain with the number 200.
     fn begun() -> RoundState {
         let mut state = RoundState::new(Phase::Idle, 0);
         state.accept(200);
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn the_next_pass_alone_is_new_and_those_beyond_are_foreign() {
         for last in [192, 200, 254, 255, u16::MAX - 1, u16::MAX] {
-            // The leader skips first numbers: after 255 comes 257.
+            // The leader skips the numbers of first passes: after 255 comes 257.
             let next = match last {
                 255 => 257,
                 u16::MAX => 1,

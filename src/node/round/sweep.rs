@@ -1,4 +1,4 @@
-//! Relay's part in a sweep of targets (Algorithms 1 and 4) and in its verdict.
+//! A relay's part in a sweep of target SIRs (Algorithms 1 and 4) and in its result.
 
 use super::computation::{Computation, LeaderTask, PassKind, SweepPass, fingerprint};
 use super::state::Action;
@@ -11,7 +11,7 @@ use crate::settings::Method;
 use crate::wire::message::{Sweep, SweepVerdict};
 
 impl Computation {
-    /// Handles a sweep from the previous relay: a pass along the chain that tries several target SIRs.
+    /// Handles a sweep from the previous relay: a message along the chain that tries several target SIRs.
     pub(crate) fn on_sweep(&mut self, context: &Context<'_>, sweep: &Sweep) -> Action {
         let behind = Behind {
             relay: sweep.relay,
@@ -30,7 +30,7 @@ impl Computation {
             return Action::Stale;
         }
         if sweep.chosen && self.seats.is_partial(context.mission().relays()) {
-            // This relay missed the pass with the profiles.
+            // This relay has missed the message with the profiles.
             return Action::Foreign;
         }
         self.state.accept(sweep.number);
@@ -43,8 +43,8 @@ impl Computation {
         )
     }
 
-    /// Starts this relay's computation in a sweep, a pass along the chain that tries target SIRs. `from` has the
-    /// previous node's farthest x in the direction of the pass for each target, m.
+    /// Starts this relay's computation for several target SIRs. `from` is the previous node's farthest x for each
+    /// target, m, in the direction of the sweep.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -66,7 +66,7 @@ impl Computation {
         self.continue_sweep(context)
     }
 
-    /// Continues this relay's computation in a sweep of target SIRs by one step.
+    /// Continues this relay's computation for several target SIRs by one step.
     pub(super) fn continue_sweep(&mut self, context: &Context<'_>) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         if ALTITUDE && is_chosen && self.chosen.is_none() {
@@ -87,7 +87,7 @@ impl Computation {
         }
     }
 
-    /// Handles a verdict, the reply with the result of a sweep, from the next relay.
+    /// Handles the result of a sweep of target SIRs, received from the next relay.
     pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &SweepVerdict) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         let link = self.link(context, is_chosen);
@@ -100,8 +100,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay takes its position for this
-    /// target. Otherwise the leader continues its search.
+    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay takes its position for it.
+    /// Otherwise the leader continues its search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;
@@ -109,7 +109,7 @@ impl Computation {
         if let Some((x_m, target)) = sweep_pass.agreed() {
             let chosen = sweep_pass.chosen;
             if let LeaderTask::Searching { search, given, .. } = &self.task {
-                // A sweep at some cross-sections is no bound for chains with other ones.
+                // The result at some lateral offsets and altitudes is no bound for chains with other ones.
                 let most = search.most(&sweep_pass.verdict.slacks);
                 self.bound = most.filter(|_| !chosen && !given);
             }

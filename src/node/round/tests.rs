@@ -1,4 +1,4 @@
-//! Tests of rounds with three relays: proofs that a neighbour is alive, and outstanding messages.
+//! Tests of the agreement with three relays: proofs that a neighbour is alive, outstanding messages.
 
 extern crate std;
 
@@ -87,8 +87,7 @@ impl Line {
     }
 }
 
-/// Delivers messages between the test chain's relays until `ends` returns true for one. Returns the delivered
-/// messages.
+/// Delivers messages between the relays until `ends` returns true for one. Returns the delivered messages.
 fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
     let mut all = Vec::new();
     for _ in 0..100_000 {
@@ -110,8 +109,7 @@ fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Mess
     panic!("it does not end: {all:?}");
 }
 
-/// Checks that a leader that keeps its position after a sensing pass schedules no retransmission. A sensing pass
-/// collects measurements along the chain.
+/// Checks that a leader that keeps its position after a sensing pass schedules no retransmission.
 #[test]
 #[cfg(feature = "sensing")]
 fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
@@ -177,7 +175,8 @@ fn an_answer_counts_from_when_what_it_answers_was_said_and_nothing_that_comes_ag
         }
         let on = line.onward(1);
         line.hear(2, &on);
-        // A retransmission: a reply counts from the first transmission, as it does not show which one it answers.
+        // After a retransmission a reply counts from the first transmission, because it does not show which one it
+        // answers.
         line.step(1, |round, _| round.resend());
         line.onward(1);
         let verdict = line.back(2);

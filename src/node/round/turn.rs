@@ -1,8 +1,8 @@
-//! Relay's turn in Algorithm 2, and the result of the turns after it.
+//! A relay's move in Algorithm 2, and the result of the moves of the relays after it.
 //!
-//! The relay that has the token searches for a better position, and reports its own to the next relay with the token and to the
-//! previous one with the result. In the first pass no relay moves, so that all learn their neighbours' positions. The result also
-//! collects the worst SIR, which the leader needs after every round.
+//! The relay that has the token searches for a better position. It reports its position to the next relay with the
+//! token, and to the previous one with the result. In the first pass no relay moves, so that all learn their
+//! neighbours' positions. The result also contains the worst SIR, which the leader needs after every round.
 
 use super::computation::{Computation, LeaderTask, PassKind, TurnPass};
 use super::state::Action;
@@ -36,11 +36,11 @@ impl Computation {
             return next;
         }
         if self.agreed_place.is_none() {
-            // This relay missed the agreement on positions, so it has none to report.
+            // This relay has missed the agreement on positions, so it has no position to report.
             return Action::Foreign;
         }
         if context.mission().interferer().is_none() || !context.is_between(token.place) {
-            // No relay is beyond Tx or Rx.
+            // Tx and Rx have no relay beyond them.
             return Action::Stale;
         }
         self.state.accept(token.number);
@@ -48,7 +48,7 @@ impl Computation {
         self.take_turn(context, TurnPass::new(token.turn, token.sir, Some(before)))
     }
 
-    /// Starts this relay's turn in Algorithm 2, in which it may move to a better position.
+    /// Starts this relay's search for a better position, when it has the token of Algorithm 2.
     pub(super) fn take_turn(&mut self, context: &Context<'_>, mut turn_pass: TurnPass) -> Action {
         self.state.wait();
         let mut searching = false;
@@ -74,7 +74,7 @@ impl Computation {
         }
     }
 
-    /// Continues the search for a better position in this relay's turn by one step.
+    /// Continues the search for a better position by one step.
     pub(super) fn continue_turn(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Turn(turn_pass) = &mut self.pass else {
             return Action::Stale;
@@ -112,8 +112,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Ends this relay's turn in Algorithm 2, and prepares its reply. The reply has the worst SIR of the hops from
-    /// this relay to Rx. `worst` is the worst SIR of the hops from the next relay to Rx, linear.
+    /// Ends this relay's part in a pass of Algorithm 2, and prepares its reply. The reply has the worst SIR of the hops
+    /// from this relay to Rx. `worst` is the worst SIR of the hops from the next relay to Rx, linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,

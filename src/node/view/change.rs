@@ -8,12 +8,12 @@
 //! | `Outstanding` | vote, forward it | reply with it: `Completed` | decide: `Completed` |
 //! | `Completed` | vote, forward it: `Outstanding` | stale | - |
 //!
-//! No pass is forwarded while a proposal is outstanding. A refused proposal leaves the positions unchanged; its leader proposes
-//! again after `probe_after` or later ([`ViewRequest`]), and a leader without neighbours only if its own vote would suffice. A
-//! proposal is bound to the node that it was forwarded to: if that neighbour is lost or replaced, this relay requests a later
-//! view.
+//! No pass is forwarded while a proposal is outstanding. A refused proposal leaves the positions unchanged. Its leader
+//! proposes again after `probe_after` or later ([`ViewRequest`]). A leader without neighbours does so only if its own
+//! vote would suffice. A proposal is bound to the node that it was forwarded to. If that neighbour is lost or replaced,
+//! this relay requests a later view.
 //!
-//! A view is requested at once at first, then less and less often.
+//! The first request for a view is sent at once. Repetitions follow less and less often.
 
 use crate::node::circulation::{Circulation, LateMessages, Reply};
 use crate::node::context::{
@@ -28,14 +28,13 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum amount by which one message can raise the latest known view number. So one message cannot use up all
-/// numbers.
+/// Maximum increase of the latest known view number by one message. One message thus cannot use up all numbers.
 const MAX_ADVANCE: u32 = 4096;
 
 /// State of one relay in view changes, by which the relays agree on the members of the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    /// Progress of the view proposal along the chain; `Outstanding` while its decision is awaited.
+    /// Progress of the view proposal along the chain. `Outstanding` while the decision is awaited.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
@@ -48,8 +47,8 @@ pub(crate) struct ViewChange {
 }
 
 impl ViewChange {
-    /// Creates the state of view changes for a chain of `relays` relays. `initial_leader` is the node number of the
-    /// leader before any view change.
+    /// Creates the state of view changes for a chain of `relays` relays. `initial_leader` is the leader before any view
+    /// change.
     pub(crate) const fn new(relays: u16, initial_leader: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, initial_leader),
@@ -62,19 +61,20 @@ impl ViewChange {
         }
     }
 
-    /// Returns the votes on views (acceptor state) for storage. `base` is the digest of the mission loaded before
-    /// flight.
+    /// Returns the votes on views to be stored. `base` is the digest of the mission loaded before flight.
     pub(crate) const fn record(&self, base: u16) -> ViewRecord {
         ViewRecord::new(base, self.electorate)
     }
 
-    /// Returns true until this relay sends or receives its first view-change message since the start.
+    /// Returns true until this relay sends or receives its first view-change message.
     pub(crate) fn is_untouched(&self) -> bool {
         self.proposed.is_none() && self.newest == self.electorate.promised()
     }
 
     /// Restores the stored votes on views after a start, and requests a view. `untouched` is true if the agreement on
-    /// positions has not started. Returns an error if this relay has already started, or has loaded another mission.
+    /// positions has not started.
+    ///
+    /// Returns an error if this relay has already started, or has loaded another mission.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -112,8 +112,8 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members of `view` have accepted it. A pass in that view is the proof. The call has no effect if
-    /// `view` is not the view that this relay has accepted last.
+    /// Records that all members of `view` have accepted it. No effect if `view` is not the last view accepted by this
+    /// relay.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -130,19 +130,19 @@ impl ViewChange {
         self.proposed
     }
 
-    /// Returns this relay's rank in the last view proposal, and the number of relays of the proposal. Ranks count from
-    /// 1 at the leader. `None` without a proposal.
+    /// Returns this relay's rank in the last view proposal, and its number of relays. Rank 1 is the leader. `None`
+    /// without a proposal.
     pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
     }
 
-    /// Returns true while too few relays can be reached for a quorum: the last proposal was refused.
+    /// Returns true if the last proposal was refused, because too few relays can be reached for a quorum.
     pub(crate) const fn has_no_quorum(&self) -> bool {
         self.refused
     }
 
-    /// Requests a view later than `proposal`, because the decision on `proposal` can no longer arrive.
+    /// Requests a view later than `proposal`, whose decision can no longer arrive.
     pub(super) fn request_later_view(&mut self, context: &Context<'_>, proposal: ViewId) {
         if self.newest <= proposal
             && let Some(later) = proposal.next_by(context.member.node)
@@ -152,15 +152,15 @@ impl ViewChange {
         self.request.request_now(context.now);
     }
 
-    /// Drops the last view proposal and requests a view, as after a restart with the stored votes.
+    /// Drops the last view proposal and requests a view, as after a restart.
     pub(crate) fn leave(&mut self, now: Instant) {
         self.proposed = None;
         self.circulation.withdraw();
         self.request.request_now(now);
     }
 
-    /// Handles a view proposal or a decision from a neighbour. Call it only if this relay has stored the mission of the
-    /// proposed view.
+    /// Handles a view proposal or a decision from a neighbour. The caller checks that this relay has stored the mission
+    /// of the proposed view.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let all = context.member.all;
         match message {
@@ -168,7 +168,7 @@ impl ViewChange {
             Message::Proposal(proposal) if proposal.place < all => {
                 self.on_proposal(context, proposal)
             }
-            // The decided view follows its base.
+            // The decided view is later than the view that it replaces.
             Message::Decision(decision)
                 if decision
                     .accepted
@@ -203,7 +203,7 @@ impl ViewChange {
         if let Some(effects) = effects {
             return effects.by(Proposer::Neighbour);
         }
-        // The proposal is late, or its leader has missed a later one.
+        // The proposal is late, or its leader has missed a later proposal.
         if self.late_messages.count_one() {
             // The proposer must use a later number.
             if let Some(later) = self.newest.next_by(context.member.node) {
@@ -214,9 +214,9 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on the proposed `view`, and returns the effects on the other layers. The proposal has already visited
-    /// `place` relays. `received` has the votes of these relays; `None` at the proposer. The result is `None` if this
-    /// relay has already promised (Paxos) `view` or a later view.
+    /// Votes on the proposed `view`, and returns the effects on the other layers. `place` relays have voted before;
+    /// their votes are `received`, `None` at the proposer. Returns `None` if this relay has already promised (Paxos)
+    /// `view` or a later view.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -229,7 +229,7 @@ impl ViewChange {
         let poll = self
             .electorate
             .vote(node, view, received, context.other_leases)?;
-        // No limit on the advance here, because this relay has voted on the view.
+        // The number may advance without limit here, because this relay has voted on the view.
         self.newest = self.newest.max(view);
         self.late_messages = LateMessages::NONE;
         self.proposed = Some(Proposed {
@@ -256,8 +256,10 @@ impl ViewChange {
     }
 
     /// Decides the outstanding view proposal, because this relay is the last one that can be reached. All reachable
-    /// relays have then voted on it. If the proposal has been forwarded before, a later view is requested instead,
-    /// because two different views with the same identifier could result.
+    /// relays have voted on it.
+    ///
+    /// If the proposal has been forwarded before, a later view is requested instead, because two different views with
+    /// the same identifier could result.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
         let Some(proposed) = self.outstanding() else {
             return Effects::NONE;
@@ -291,7 +293,7 @@ impl ViewChange {
         self.apply_view_verdict(context, verdict)
     }
 
-    /// Schedules another view proposal after a refusal, because more relays can be reachable by then.
+    /// Schedules another view proposal after a refusal, because more relays may be reachable by then.
     pub(super) fn retry_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
         self.request.request_after_refusal(context.now, wait);
@@ -332,12 +334,12 @@ impl ViewChange {
         };
         let holds = [context.latest, context.member.active].contains(&proposed.mission_id);
         if !holds {
-            // This relay has replaced the proposed mission by a newer one, which the other relays will receive.
+            // This relay has replaced the proposed mission by a newer one. The other relays will receive it.
             return Effects::FOREIGN;
         }
         let proposal = proposed.view;
         if !self.electorate.accept(proposal, base, accepted) {
-            // Decision on a proposal with the same identifier, made by another node that uses the proposer's index.
+            // Another node that uses the proposer's index has made this proposal with the same identifier.
             self.request_later_view(context, proposal);
             return Effects::STALE;
         }
@@ -348,7 +350,7 @@ impl ViewChange {
         proposed.usable_in = usable_in;
         let leads = proposed.rank == 1;
         if leads && accepted.is_some() {
-            // All other members have accepted it before.
+            // All other members have accepted the view before.
             self.electorate.commit();
         }
         self.refused = accepted.is_none();
@@ -356,7 +358,7 @@ impl ViewChange {
         self.circulation.complete(context.now, path);
         self.request.stop();
         if leads && accepted.is_none() {
-            // Relays that have learned of a newer view by this decision can vote on the next proposal at once.
+            // By this decision relays have learned of a newer view, so they can vote on the next proposal at once.
             if has_newer_base {
                 self.request.request_now(context.now);
             } else {
@@ -421,8 +423,8 @@ impl ViewChange {
         })
     }
 
-    /// Handles the next relay's reply that message `number` is in progress. Returns true if `number` is the number of
-    /// the outstanding view proposal.
+    /// Handles the next relay's reply that message `number` is in progress. Returns true if it is the outstanding view
+    /// proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .outstanding()
@@ -437,7 +439,7 @@ impl ViewChange {
 
 impl ViewChange {
     /// Handles the timers of retransmissions and view requests. `leads` is true if this relay has no neighbour toward
-    /// the leader. `fresh` is true if this relay has not taken part in any pass or view since its start.
+    /// the leader. `fresh` is true if it has not taken part in any agreement or view since its start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -471,7 +473,7 @@ impl ViewChange {
         let Some(view) = next.filter(|_| !under_way) else {
             return Effects::NONE;
         };
-        // Without a chance of success no proposal is made, because each one uses up a view number.
+        // Each proposal uses up a view number, so none is made without a chance of success.
         let Member { node, all, .. } = *context.member;
         let is_alone = self.refused && context.end && context.settings().quorum;
         if is_alone
@@ -501,19 +503,18 @@ impl ViewChange {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     pub(crate) view: ViewId,
-    /// Identifier of the mission that the relays of the proposed view are to fly.
+    /// Identifier of the mission that the proposed view's relays will fly.
     pub(crate) mission_id: MissionId,
     /// Position of this relay in the order in which the relays vote: 1 for the proposer.
     pub(crate) rank: u16,
-    /// Votes of the relays on the proposed view, including the vote of this relay.
+    /// Votes on the proposed view, including this relay's vote.
     pub(super) poll: Poll,
-    /// Node to which the proposal was forwarded; `None` until it is forwarded. The proposal is never sent to a second
-    /// node, because two views with the same identifier could result.
+    /// Node to which the proposal was forwarded; `None` until then. It is never sent to a second node, because two
+    /// views with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decided view replaces. Before the decision: the newest view known to be agreed on. The decision
-    /// can name another view.
+    /// View that the decided view replaces. Before the decision: the newest view known to be agreed on.
     pub(crate) base: View,
-    /// Number of relays that the view proposal has reached; 0 until its decision is known.
+    /// Number of relays that the proposal has reached; 0 until its decision is known.
     pub(super) reached: u16,
     /// View that the decision accepted; `None` before the decision and without a quorum.
     pub(super) accepted: Option<View>,
@@ -529,7 +530,7 @@ pub(super) struct ViewVerdict {
     pub(super) usable_in: u16,
 }
 
-/// Request of this relay for a new view, and the timer that repeats the request.
+/// Request of this relay for a new view, with the timer of its repetition.
 ///
 /// | situation | wait before the request | set by |
 /// | --- | --- | --- |
@@ -548,8 +549,8 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive refusals of view proposals, for lack of a quorum.
     refusals: u8,
-    /// Earliest time of the next view request after a refusal, if a new reason for a view arises. `None` if a new
-    /// reason does not make the request earlier.
+    /// Earliest time of a view request for a new reason after a refusal. `None` if a new reason does not make the
+    /// request earlier.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
@@ -573,8 +574,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, and repeats the request until a view is decided. If a request waits after a refusal, this call
-    /// shortens the wait, because there is a new reason for a view.
+    /// Requests a view, and repeats the request until a view is decided. After a refusal it shortens the wait, because
+    /// there is a new reason for a view.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);
@@ -585,7 +586,7 @@ impl ViewRequest {
         }
     }
 
-    /// Requests a view at once and resets all waits, because new information is available.
+    /// Requests a view at once, and resets all waits.
     #[inline(never)] // called from many places
     pub(crate) fn request_now(&mut self, now: Instant) {
         self.pending = true;
@@ -602,7 +603,7 @@ impl ViewRequest {
         }
     }
 
-    /// Requests a view (membership) after about `wait`. Consecutive refusals double the wait up to three times.
+    /// Requests a view after about `wait`. Consecutive refusals double the wait up to three times.
     ///
     /// [`request_now`](Self::request_now) ends the doubling.
     pub(super) fn request_after_refusal(&mut self, now: Instant, wait: Duration) {
@@ -620,18 +621,18 @@ impl ViewRequest {
         self.not_before = None;
     }
 
-    /// Starts the timer for the first pass along the chain. If no pass is received by `at`, a view is requested.
+    /// Starts the timer for the first message along the chain. If none is received by `at`, a view is requested.
     pub(crate) const fn await_first(&mut self, at: Instant) {
         self.at = Some(at);
     }
 
-    /// Returns true if the timer of the view request, or of the first pass, has expired.
+    /// Returns true if the timer of the view request, or of the first message along the chain, has expired.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer of view requests. Returns true if the relay must send a request. This is so if a
-    /// request is pending, or if this relay is `fresh` (no pass or view since its start).
+    /// Handles the expired timer of view requests. Returns true if the relay must send a request: it is already
+    /// pending, or this relay is `fresh` (no agreement or view since its start).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {
@@ -657,7 +658,7 @@ impl ViewRequest {
         self.at
     }
 
-    /// Creates a request for a new view that must be sent at `at`.
+    /// Creates a request for a new view to be sent at `at`.
     #[cfg(test)]
     pub(super) const fn due(at: Instant) -> Self {
         Self {

@@ -9,8 +9,8 @@
 //! | decision | toward the leader | accept the decided view, unless a later proposal was promised | `accepted` |
 //! | pass of that view | toward the last relay | record that all members have accepted it | `agreed` |
 //!
-//! Every decision, also a refusal, names the view that it follows. Relays that did not know that view could not vote; they can
-//! vote on the next proposal.
+//! Every decision, also a refusal, names the view that it follows. Relays that did not know that view could not vote.
+//! They can vote on the next proposal.
 //!
 //! The last relay decides by the poll in the proposal:
 //!
@@ -22,30 +22,32 @@
 //! | a quorum otherwise | a view of all polled relays |
 //!
 //! # Safety
-//! Two decisions on the successor of one view have a member of that view in common. If the member accepts the earlier decision
-//! before the later proposal arrives, it reports that decision with its vote. Otherwise it has promised the later proposal and no
-//! longer accepts the earlier decision, so the earlier leader never learns that all members have accepted it. Only members vote.
+//! Two decisions on the successor of one view have a member of that view in common. If the member accepts the earlier
+//! decision before the later proposal arrives, it reports that decision with its vote. Otherwise it has promised the
+//! later proposal and no longer accepts the earlier decision. So the earlier leader never learns that all members have
+//! accepted it. Only members vote.
 //!
 //! # Membership
-//! Each relay forwards a proposal to only one other, so a proposal takes one route, and every relay that has voted on it is a
-//! member of the view that may result, whether or not it receives the decision. A relay remembers [`VOTES`] proposals without a
-//! known decision, the earliest and the latest. If it has forgotten its vote for a view it cannot vote in that view, but may in
-//! the next one; this is safe.
+//! Each relay forwards a proposal to only one other, so a proposal takes one route. Every relay that has voted on it is
+//! a member of the view that may result, whether or not it receives the decision. A relay remembers [`VOTES`] proposals
+//! without a known decision, the earliest and the latest. If it has forgotten its vote for a view it cannot vote in
+//! that view, but may in the next one; this is safe.
 //!
 //! # Requirement
-//! A relay that restarts without its [`ViewRecord`](crate::ViewRecord) is a member of the initial view only, and its promises are
-//! lost. Therefore relays that know no later view, including those without their records, must not form a quorum of the initial
-//! view. In a chain of five of which three fly on, one lost record is too many: with the two relays left behind it decides beside
-//! the two that remember. A relay that loses its record during a proposal may also forward the proposal on a second route.
+//! A relay that restarts without its [`ViewRecord`](crate::ViewRecord) is a member of the initial view only, and its
+//! promises are lost. Therefore relays that know no later view, including those without their records, must not form a
+//! quorum of the initial view. In a chain of five of which three still fly, one lost record is too many. Together with
+//! the two relays left behind this relay can decide, independently of the two that still have their records. A relay
+//! that loses its record during a proposal may also forward the proposal on a second route.
 
 use crate::node::context::{OtherLeases, tenths};
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// Number of view proposals with an unknown decision for which a relay remembers its vote.
+/// Number of undecided view proposals for which a relay remembers its vote.
 pub(super) const VOTES: usize = 8;
 
-/// Acceptor state of one relay: its promises and votes on views, as in Paxos.
+/// Promises and votes of one relay on views (acceptor state in Paxos).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Electorate {
     /// Newest view that is known to be agreed on.
@@ -53,17 +55,17 @@ pub(crate) struct Electorate {
     /// True if this relay is a member of the view `agreed`, so that its vote counts.
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// View that this relay has accepted, without knowing if a quorum has; `None` if there is none.
+    /// View that this relay has accepted without knowing that it is agreed on; `None` if there is none.
     pub(super) accepted: Option<Successor>,
-    /// View proposals that this relay has voted on and that can still become views, latest first.
+    /// Proposals that this relay has voted on and that can still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
-    /// Node number of the leader before any view change. Of two halves of the initial view, the half with this node
-    /// has the quorum.
+    /// Node number of the leader before any view change. If the initial view splits into halves, the half with this
+    /// node has the quorum.
     pub(super) initial_leader: u16,
 }
 
 impl Electorate {
-    /// Creates the initial voting state for a chain of `relays` relays with this initial leader.
+    /// Creates the initial voting state for a chain of `relays` relays.
     pub(crate) const fn new(relays: u16, initial_leader: u16) -> Self {
         Self {
             agreed: View {
@@ -78,20 +80,21 @@ impl Electorate {
         }
     }
 
-    /// Returns the latest view proposal that this relay has promised, as in Paxos. The relay accepts no earlier proposal.
+    /// Returns the latest view proposal that this relay has promised. It accepts no earlier proposal (Paxos).
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
     }
 
-    /// Returns the newest view that is known to be agreed on.
     #[cfg(test)]
     pub(crate) const fn agreed(&self) -> View {
         self.agreed
     }
 
-    /// Votes on the view `proposal`, and returns the votes so far, including this vote. `None` if this relay has already promised
-    /// `proposal` or a later view. `received` has the votes of earlier relays; `None` at the proposer. `other_leases` has the remaining
-    /// times of other relays' leases.
+    /// Votes on the view `proposal`, and returns the votes so far. `None` if this relay has already promised `proposal`
+    /// or a later view.
+    ///
+    /// `received` has the votes of earlier relays; `None` at the proposer. `other_leases` are the remaining times of
+    /// other relays' leases.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -110,7 +113,7 @@ impl Electorate {
         }
         let newer = self.agreed.id > received.agreed.id;
         let before = if newer {
-            // Earlier voters were not members of the newer view, as far as they know.
+            // As far as they know, earlier voters were not members of the newer view.
             Poll::of(self.agreed)
         } else {
             received
@@ -139,7 +142,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of this relay, `node`, is not enough for a quorum on `proposal`. The relay does not vote in this call.
+    /// Returns true if the vote of node `node` alone is not enough for a quorum on `proposal`. Does not vote.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -152,8 +155,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view `proposal` in the list of votes. If the list is full, it keeps the earliest four
-    /// votes and the latest four votes, including the new vote.
+    /// Records the vote on the view `proposal`. A full list keeps the earliest four and the latest four votes,
+    /// including the new one.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -163,7 +166,7 @@ impl Electorate {
         }
     }
 
-    /// Records that `view` is known to be agreed on. Votes on earlier proposals and the accepted view are dropped.
+    /// Records that `view` is known to be agreed on, and drops earlier votes and the accepted view.
     fn learn(&mut self, view: View) {
         self.member = self.voted.contains(&view.id);
         self.agreed = view;
@@ -171,7 +174,7 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Removes the votes on proposals for which `is_decided` returns true. Such proposals can no longer become views.
+    /// Removes the votes on proposals for which `is_decided` returns true. They can no longer become views.
     fn forget(&mut self, is_decided: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
         let voted = self.voted.iter().filter(|voted| !is_decided(**voted));
@@ -181,8 +184,8 @@ impl Electorate {
         self.voted = kept;
     }
 
-    /// Accepts the decision on `proposal`; returns false if a later proposal was promised. `view` is the decided
-    /// view, which replaces `base`; `None` for a refusal.
+    /// Accepts the decision on `proposal`; returns false if a later proposal was promised. `view` is the decided view,
+    /// which replaces `base`; `None` for a refusal.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -200,7 +203,7 @@ impl Electorate {
         true
     }
 
-    /// Records that all members have accepted the view that this relay accepted last. This view is then agreed on.
+    /// Records that the last accepted view is agreed on, because all its members have accepted it.
     pub(crate) fn commit(&mut self) {
         if let Some(accepted) = self.accepted {
             self.learn(accepted.view);
@@ -214,16 +217,16 @@ impl Electorate {
     }
 }
 
-/// Returns the time until relays are allowed to use positions of the next view, in tenths of a second. The result is at most `most`; `most`
-/// also stands for an unknown time.
+/// Returns the time until positions of the next view may be used, in tenths of a second. It is at most `most`, and
+/// `most` if unknown.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
     poll.earlier_lease_left.max(lease_left).min(most)
 }
 
-/// Returns the decided view for `proposal`; `None` without a quorum. The proposal has reached `relays` of the
-/// mission's `all` relays, with the votes `poll`.
+/// Returns the view decided on `proposal` with the votes `poll`; `None` without a quorum. The proposal has reached
+/// `relays` of the mission's `all` relays.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,
@@ -232,7 +235,7 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
     if relays == all {
         return Some(whole);
     }
-    // Of two equal halves, the one with the view's proposer counts as the larger.
+    // Of two equal halves, the half with the view's proposer counts as the larger.
     let weight = 2 * u32::from(poll.votes) + u32::from(poll.proposer);
     if weight <= u32::from(poll.agreed.relays) {
         return None;
@@ -243,7 +246,7 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
-    /// Disables the quorum rule, so that a test can show that the model check finds this fault.
+    /// Test helper: disables the quorum rule, so that the model check can show that it finds this fault.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;

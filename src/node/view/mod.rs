@@ -1,10 +1,13 @@
 //! View change: agreement on the members of the chain.
 //!
-//! A *view* is an agreed membership: the number of relays and the place of each. View 0 is the chain as configured in the
-//! mission. The digest of every pass includes the view, so a pass is ignored in any other view. A relay whose neighbours differ
-//! from its view, or that receives a pass it cannot take part in, requests a new view from its neighbour toward the leader, hop
-//! by hop, until a view comes. The leader, which has no such neighbour, proposes the view; the proposal is forwarded to the last
-//! relay and collects votes on the way, and the decision travels back.
+//! A *view* is an agreed membership: the number of relays and the place of each. View 0 is the chain as configured in
+//! the mission. Every message of an agreement on positions (a pass along the chain) has a digest that includes the
+//! view, so a pass is ignored in any other view.
+//!
+//! A relay requests a new view if its neighbours differ from its view. It also does so if it receives a pass that it
+//! cannot take part in. The request is forwarded from neighbour to neighbour toward the leader, and repeated until
+//! there is a new view. The leader, which has no neighbour on that side, proposes the view. The proposal is forwarded
+//! to the last relay and collects votes on the way. The decision travels back.
 //!
 //! | event | action |
 //! | --- | --- |

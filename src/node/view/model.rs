@@ -1,4 +1,6 @@
-//! Model check of the view change. It runs the code of the firmware in short chains, under every order of events.
+//! Model check of the view change: runs the firmware's code under every order of events.
+//!
+//! The chains have three or four relays.
 //!
 //! | event | model |
 //! | --- | --- |
@@ -11,12 +13,13 @@
 //! | departure or join | a relay goes outside of the chain, where it has no neighbours, or comes back; its neighbours select each other |
 //! | reboot | the relay keeps only its acceptor state, or loses that, too |
 //!
-//! The numbers of cuts, proposals, reboots, departures and joins are bounded, nothing else is. Time is not modelled. The lease adds that positions
-//! of a view are not used before members of the previous view have released theirs.
+//! The numbers of cuts, proposals, reboots, departures and joins are bounded, nothing else is. Time is not modelled.
+//! The lease ensures in addition that positions of a view are not used before members of the previous view have
+//! released theirs.
 //!
-//! A view is *in force* from the time its leader knows that all members have accepted it until a successor is in force. Views
-//! that follow each other one by one are never in force together. The check is therefore that all agreed views form one sequence,
-//! starting with the initial view.
+//! A view is *in force* from the time its leader knows that all members have accepted it until a successor is in force.
+//! Views that follow each other one by one are never in force together. So the check is that all agreed views form one
+//! sequence, starting with the initial view.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -64,7 +67,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Checks that there is one sequence of views when a spare joins and a relay leaves.
+/// Checks that the views form one sequence when a spare joins and a relay leaves.
 #[test]
 fn departures_and_joins_keep_one_sequence_of_views() {
     for (relays, outside, (cuts, proposals, reboots, moves)) in [
@@ -87,7 +90,7 @@ fn departures_and_joins_keep_one_sequence_of_views() {
 }
 
 /// Checks that the model check finds a wrong rule for departures. By this rule a departure reduces the quorum before
-/// the chain has agreed on the departure.
+/// the chain has agreed on it.
 #[test]
 fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     let check = Check {
@@ -100,7 +103,7 @@ fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     assert_eq!(found.what, ONE_CHAIN, "{}", found.how);
 }
 
-/// Model check of the view change with more events than in the usual test; takes some minutes.
+/// Model check of the view change with more events; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {
@@ -111,7 +114,7 @@ fn chains_of_three_and_four_in_more_states() {
     all_holds(4, (2, 3, 1), false);
 }
 
-/// Checks that the model check finds a broken quorum rule. If all reachable relays could vote, two views would be in
+/// Checks that the model check finds a broken quorum rule. If all reachable relays could vote, two views could be in
 /// force at the same time.
 #[test]
 fn the_check_finds_the_fault_of_counting_all_votes() {
@@ -135,10 +138,10 @@ fn the_check_finds_the_fault_of_a_lost_record() {
     assert!(check.search().is_some());
 }
 
-/// View with its number of members, as a pair that can be sorted.
+/// Identifier of a view and its number of members. Can be sorted.
 pub(super) type SizedView = (ViewId, u16);
 
-/// Message in a frame of the model. It has no mission and no times.
+/// Message of the model, without mission and times.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) enum Body {
     Proposal {
@@ -169,7 +172,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
-    /// View that the relay accepted last, the relay's rank in this view, and its number of members.
+    /// Last accepted view, the relay's rank in it, and its number of members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -199,7 +202,7 @@ impl core::hash::Hash for RelayState {
     }
 }
 
-/// Decided view of the model: its size, the view that it replaces, and the relays that voted.
+/// Decided view: its size, the view that it replaces, and the relays that voted.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) struct DecidedView {
     pub(super) view: SizedView,
@@ -211,13 +214,13 @@ pub(super) struct DecidedView {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Chain {
     pub(super) relays: Vec<RelayState>,
-    /// Part number of each relay while links are cut. Relays with equal numbers reach each other.
+    /// Part number of each relay while links are cut. Relays with equal numbers receive each other.
     pub(super) parts: Vec<u8>,
-    /// Frames that were sent and can still arrive, sorted and without duplicates.
+    /// Sent frames that can still arrive, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// Views that the relays of the model have ever decided on.
+    /// Views that were ever decided on.
     pub(super) decided: Vec<DecidedView>,
-    /// Views that were ever agreed on: all members have accepted them.
+    /// Views that were ever accepted by all their members.
     pub(super) agreed: Vec<SizedView>,
     pub(super) cuts: u8,
     pub(super) proposals: u8,
@@ -225,7 +228,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
     /// Bit mask of the relays outside of the chain; bit 0 is the first relay.
     pub(super) outside: u8,
-    /// Number of departures and joins that can still happen in this run of the model.
+    /// Number of departures and joins that can still happen.
     pub(super) moves: u8,
 }
 
@@ -240,11 +243,11 @@ pub(super) enum ModelEvent {
     Passes(usize),
     Reboots(usize),
     Forgets(usize),
-    /// Event: the relay with this list index leaves the chain, or joins it again.
+    /// The relay with this list index leaves the chain, or joins it again.
     Moves(usize),
 }
 
-/// Inserts `one` into the sorted list `all`; does nothing if the list already contains `one`.
+/// Inserts `one` into the sorted list `all`, unless the list contains it.
 pub(super) fn insert_sorted<T: Ord>(all: &mut Vec<T>, one: T) {
     if let Err(at) = all.binary_search(&one) {
         all.insert(at, one);
@@ -260,7 +263,7 @@ impl Chain {
         (at + 1..self.parts.len()).find(|&other| self.are_linked(at, other))
     }
 
-    /// Returns true if two relays are both inside of the chain, and their link is not cut.
+    /// Returns true if two relays are both inside of the chain and their link is not cut.
     fn are_linked(&self, one: usize, other: usize) -> bool {
         self.parts[other] == self.parts[one] && self.outside & (1 << one | 1 << other) == 0
     }
@@ -342,10 +345,10 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Broken rule, for a test: a departure counts as agreed on at once, at all other relays.
+    /// Broken rule, for a test: all other relays at once count a departure as agreed on.
     Inside,
-    /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view that one of
-    /// these relays knows.
+    /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view known to one of
+    /// them.
     Everybody,
 }
 
@@ -423,7 +426,7 @@ impl Check {
         }
     }
 
-    /// Returns the relays that have voted on the view `proposal`, as a bit mask; bit 0 is the first relay.
+    /// Returns the relays that have voted on the view `proposal` as a bit mask; bit 0 is the first relay.
     pub(super) fn voters(chain: &Chain, proposal: ViewId) -> u8 {
         let voters = chain.relays.iter().zip(0..);
         let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
@@ -435,8 +438,7 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// Sends the pending messages of relay `at`: adds them to the model's frames in transit. Records the decision in
-    /// `effects`, if any.
+    /// Sends the pending messages of relay `at` into the air. Records the decision in `effects`, if any.
     pub(super) fn apply_effects(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
@@ -492,7 +494,7 @@ impl Check {
         if self.rule == Rule::Everybody {
             change.electorate.count_everybody();
         }
-        // Resets timers and everything that only repairs late messages, to reduce the number of states.
+        // Resets timers and the handling of late messages, to reduce the number of states.
         change.newest = ViewId::LOADED;
         change.request = ViewRequest::new(1);
         change.refused = false;
@@ -588,8 +590,8 @@ impl Check {
 }
 
 impl Check {
-    /// Returns true if the agreed views form one sequence. Each agreed view replaces the initial view or another
-    /// agreed view, and no two agreed views replace the same view.
+    /// Returns true if the agreed views form one sequence. Each of them replaces the initial view or another agreed
+    /// view, and no two of them replace the same view.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {
             let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
@@ -614,9 +616,9 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Each of these views
-    /// must also have at most as many members as its number of relays. A member is a relay that knows this view as the
-    /// newest agreed view, and has a vote in it.
+    /// Returns true if every view that a relay knows as agreed on is in the list of agreed views. Such a view must also
+    /// have at most as many members as its number of relays. A member is a relay that has a vote in this view, and
+    /// knows it as the newest agreed view.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {
@@ -636,7 +638,7 @@ impl Check {
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {
-    /// Delivers all frames between the relays in the bit mask `there`, until nothing changes any more.
+    /// Delivers all frames between the relays in the bit mask `there` until nothing changes any more.
     pub(super) fn drain(&self, chain: &mut Chain, there: u8) {
         loop {
             let before = chain.clone();
@@ -655,7 +657,7 @@ impl Check {
     }
 
     /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. They must
-    /// also be a quorum of every view that was decided later.
+    /// also be a quorum of every later decided view.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.relays.len()).filter(known);
@@ -674,9 +676,9 @@ impl Check {
 
     /// Returns the number of proposals until the relays in the bit mask `there` agree on a view.
     ///
-    /// The members of this view are exactly these relays. From this state on only the links between these relays
-    /// work. Frames in transit are still delivered if `keeps_air` is true, else they are lost. `Some(0)` if the
-    /// relays are no quorum; `None` if [`MAX_PROPOSALS`] are not enough.
+    /// The members of this view are exactly these relays, and only the links between them work. If `keeps_air` is true,
+    /// frames in transit are still delivered; otherwise they are lost. Returns `Some(0)` if the relays are no quorum,
+    /// and `None` if [`MAX_PROPOSALS`] are not enough.
     pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {
@@ -759,7 +761,7 @@ impl Model for Check {
                 actions.push(ModelEvent::Moves(at));
             }
             if chain.outside >> at & 1 == 1 {
-                // It is silent until it comes back.
+                // The relay is silent until it returns to the chain.
                 continue;
             }
             if chain.proposals > 0 && chain.before(at).is_none() {
@@ -828,7 +830,7 @@ impl Model for Check {
     }
 }
 
-/// Violated property that the model check has found, and the events that lead to the violation.
+/// Violated property, and the events that lead to the violation.
 pub(super) struct Counterexample {
     pub(super) what: &'static str,
     pub(super) how: String,

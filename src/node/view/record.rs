@@ -1,4 +1,4 @@
-//! Persistent acceptor state: without it a restarted relay breaks its promises.
+//! Stored votes on views. Without them a restarted relay could break its promises.
 
 use super::electorate::{Electorate, VOTES};
 use crate::mission::MAX_RELAYS;
@@ -8,9 +8,9 @@ use crate::wire::message::Successor;
 /// Version of the stored record's format, in its first byte.
 const FORMAT: u32 = 1;
 
-/// Acceptor state that must survive a reboot in flight.
+/// Votes on views, which must survive a reboot in flight.
 ///
-/// Without it a restarted relay could vote twice, and two parts of a chain could each decide on a view.
+/// Without them a restarted relay could vote twice, and two parts of a chain could each decide on a view.
 ///
 /// | event | action of the firmware |
 /// | --- | --- |
@@ -18,23 +18,23 @@ const FORMAT: u32 = 1;
 /// | the relay is switched on in flight | pass the record to `Relay::resume_view` right after `Relay::new` |
 /// | the relay is switched on before another flight | delete the record |
 ///
-/// The relay transmits nothing while its record is not confirmed as stored. The record changes a few times in a view change, and
-/// never otherwise.
+/// The relay transmits nothing until the firmware has confirmed that its record is stored. The record changes a few
+/// times in a view change, and never otherwise.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ViewRecord {
     /// Digest of the mission that was loaded before flight.
     base: u16,
-    /// Votes on views (acceptor state). The field `initial_leader` is 0, because it is not stored.
+    /// Votes on views. Their `initial_leader` is 0, because it is not stored.
     electorate: Electorate,
 }
 
-/// Reason why a stored record of the view votes is rejected.
+/// Reason why a stored record is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum RecordError {
     /// The relay that wrote the record had loaded another mission.
     Base,
-    /// The relay has already started, so its votes can no longer be restored.
+    /// The relay has already started, so the votes can no longer be restored.
     Begun,
 }
 
@@ -43,8 +43,8 @@ error_texts!(RecordError {
     Begun => "the record of votes must be restored before the relay starts",
 });
 
-/// Writer of numbers of one, two or four bytes, least significant byte first. The writer needs a third of the flash
-/// that an iterator over all bytes would need.
+/// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash of an
+/// iterator over all bytes.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -64,7 +64,7 @@ impl RecordWriter<'_> {
     }
 }
 
-/// Reader of the numbers that [`RecordWriter`] writes.
+/// Reader of the numbers written by [`RecordWriter`].
 #[derive(Debug)]
 struct Reader<'a>(core::slice::Iter<'a, u8>);
 
@@ -100,7 +100,7 @@ impl Reader<'_> {
 }
 
 impl ViewRecord {
-    /// Length of a stored record of the view votes, bytes.
+    /// Length of a stored record, bytes.
     pub const LENGTH: usize = 25 + 4 * VOTES;
 
     pub(crate) const fn new(base: u16, electorate: Electorate) -> Self {
@@ -113,7 +113,8 @@ impl ViewRecord {
         }
     }
 
-    /// Returns the votes on views (acceptor state) in the record. `None` if the record belongs to another mission.
+    /// Returns the votes in the record; `None` if it belongs to another mission.
+    ///
     /// The loaded mission has the digest `base`, `relays` relays and the leader `initial_leader`.
     pub(super) fn electorate(
         &self,
@@ -129,7 +130,7 @@ impl ViewRecord {
         })
     }
 
-    /// Encodes the record of the view votes for storage, without a checksum.
+    /// Encodes the record for storage, without a checksum.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
         let said = &self.electorate;
         let accepted = said.accepted.unwrap_or(nothing_after(said.agreed));
@@ -182,7 +183,7 @@ impl ViewRecord {
     }
 }
 
-/// Returns the value that the record stores for "no accepted view". `agreed` is the relay's newest agreed view.
+/// Returns the stored value for "no accepted view". `agreed` is the relay's newest agreed view.
 const fn nothing_after(agreed: View) -> Successor {
     Successor {
         proposal: ViewId::LOADED,
@@ -190,7 +191,7 @@ const fn nothing_after(agreed: View) -> Successor {
     }
 }
 
-/// Returns true if a relay can have the acceptor state `kept`. A stored record with any other state is invalid.
+/// Returns true if a relay can have the acceptor state `kept`. Any other stored state is invalid.
 fn is_sound(kept: &Electorate) -> bool {
     let Electorate {
         agreed, promised, ..
@@ -278,7 +279,7 @@ mod tests {
         assert_eq!(ViewRecord::from_bytes(&[0; ViewRecord::LENGTH]), None);
     }
 
-    /// Checks that a stored record with one changed byte is rejected, or encodes to the same bytes again.
+    /// Checks that a stored record with one changed byte is rejected, or encodes to the same bytes.
     #[test]
     fn impossible_votes_are_not_read() {
         let mut taken = 0;
@@ -330,7 +331,7 @@ mod tests {
         assert_eq!(first.unpersisted(), None);
     }
 
-    /// Checks that a relay sends nothing before its record is stored. It is relay 2 of 3, on a shared channel, with
+    /// Checks that a relay sends nothing before its record is stored. It is relay 2 of 3 on a shared channel, with
     /// silent neighbours.
     #[test]
     fn nothing_is_sent_before_the_record_is_stored() {
@@ -376,7 +377,7 @@ mod tests {
             twice.resume_view(Instant::ZERO, &busy),
             Err(RecordError::Begun)
         );
-        // A leader starts by itself.
+        // A leader starts without a received message.
         let mut leader = relay_with(3, 1, Settings::default());
         let soon = Instant::from_millis(1);
         while let Some(at) = leader.poll_timeout().filter(|at| *at < soon) {

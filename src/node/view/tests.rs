@@ -17,7 +17,8 @@ pub(super) fn id(number: u32, node: u32) -> ViewId {
     ViewId::from_bits(number << 10 | node)
 }
 
-/// Relay under test, in a chain of four. The relay has stored a mission of version 4, but flies the mission loaded before flight.
+/// Relay under test, in a chain of four. It has stored a mission of version 4, but flies the mission loaded before
+/// flight.
 pub(super) struct Relay {
     pub(super) member: Member,
     pub(super) latest: MissionId,
@@ -57,15 +58,14 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Makes this relay the last relay that can be reached. This relay then decides the view proposal that awaits a
-    /// decision.
+    /// Makes this relay the last one that can be reached, so that it decides the outstanding proposal.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
         self.view.decide(&context)
     }
 
-    /// Makes this relay the leader: no relay precedes it, and its view request is due.
+    /// Makes this relay the leader: no relay precedes it, and it must send its view request.
     pub(super) fn leads(&mut self) -> Effects {
         self.view.request.start(self.now);
         self.now = self.view.request.next_timeout().unwrap();
@@ -95,7 +95,7 @@ impl Relay {
         })
     }
 
-    /// Returns a decision of the next relay on `proposal`. `view` is the accepted view; `None` for a refusal.
+    /// Returns the next relay's decision on `proposal`. `view` is the accepted view; `None` for a refusal.
     pub(super) fn decision(&self, proposal: ViewId, view: Option<View>) -> Message {
         Message::Decision(Decision {
             mission_id: self.latest,
@@ -192,8 +192,8 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// Checks that a second proposal of the same view, but for another mission, is no duplicate. The leader has restarted
-/// in between, and has received another mission.
+/// Checks that a second proposal of the same view for another mission is no duplicate. The leader has restarted in
+/// between, and has received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -272,7 +272,7 @@ fn the_last_relay_decides() {
     };
     assert_eq!(relay.handle(&Message::Proposal(proposal)), granted);
     assert!(relay.view.electorate.awaits(id(1, 1)));
-    // The first pass shows that all relays have accepted it.
+    // The first pass shows that all relays have accepted the view.
     relay.view.commit(id(1, 1));
     assert_eq!(relay.view.electorate.agreed(), all(id(1, 1)));
     relay.view.commit(id(1, 1));
@@ -304,8 +304,8 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Checks that a refusal names the agreed view. From the refusal, relays near the leader learn the newest view.
-/// Otherwise their proposals would be refused for ever.
+/// Checks that a refusal names the agreed view, so that relays near the leader learn of it. Otherwise their proposals
+/// would be refused for ever.
 #[test]
 fn a_refusal_names_the_agreed_view() {
     let view = View {
@@ -346,7 +346,7 @@ fn a_refusal_names_the_agreed_view() {
             );
             assert_eq!(second.view.electorate.agreed(), view);
         } else {
-            // Two of its three members are polled, now that both know the view.
+            // Both relays now know the view, so two of its three members vote.
             assert!(matches!(
                 decided,
                 Some(LayerEvent::ProposalDecided(ProposalOutcome::Granted {
@@ -377,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a relay ignores the decision on a view whose mission is older than its stored mission.
+/// Checks that a relay ignores the decision on a view with an older mission than its stored one.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();
@@ -450,15 +450,15 @@ fn a_forwarded_proposal_without_a_next_relay_is_abandoned() {
         assert!(relay.view.request.is_pending());
         assert_eq!(relay.view.latest_view(), id(2, 2), "one number more, once");
     }
-    // A later proposal may end here.
+    // Relay 2 may decide a later proposal as the last relay.
     let later = relay.proposal(id(3, 1));
     assert!(relay.handle(&later).event.is_some());
 }
 
 /// Checks that a relay forwards a view proposal to one node only.
 ///
-/// Otherwise, if only relay 1 has lost relay 2, two views could have the same identifier: one with the members 1 to
-/// 3, one with 1 and 4.
+/// Otherwise two views could have the same identifier if only relay 1 has lost relay 2: one with the members 1 to 3,
+/// and one with 1 and 4.
 #[test]
 fn a_proposal_is_forwarded_to_only_one_node() {
     let mut relay = Relay::new(1);
@@ -505,7 +505,7 @@ fn a_leader_proposes_later_views_one_at_a_time() {
     relay.view.observe_view(id(8, 2));
     assert!(relay.leads().began);
     assert_eq!(relay.view.latest_view(), id(9, 1));
-    // A view far ahead is approached in steps.
+    // The latest known view approaches a view far ahead in steps.
     for number in [4_105, 8_201, 9_000, 9_000] {
         relay.view.observe_view(id(9_000, 3));
         assert_eq!(relay.view.latest_view(), id(number, 3));
@@ -525,7 +525,7 @@ fn a_refused_lone_leader_proposes_only_with_a_quorum() {
         assert!(relay.view.has_no_quorum() && relay.view.request.is_pending());
     }
     assert_eq!(relay.view.latest_view(), newest);
-    // With a successor the poll may have another result.
+    // With a next relay the vote may have another result.
     relay.end = false;
     let began = (0..8).any(|_| relay.leads().began);
     assert!(began && relay.view.latest_view() > newest);

@@ -1,4 +1,4 @@
-//! Rules of voting, for different orders of proposals and decisions.
+//! Tests of the voting rules, for different orders of proposals and decisions.
 
 extern crate std;
 
@@ -82,8 +82,8 @@ fn view(number: u32, node: u32, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks that a subset of a chain's relays decides only if it is a quorum. All subsets of chains of up to seven
-/// relays are tested. A quorum is more than half of the relays, or half with the initial leader.
+/// Checks that a part of a chain decides only if it is a quorum. All parts of chains of up to seven relays are tested.
+/// A quorum is more than half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_or_half_with_the_initial_leader_decide() {
     for relays in 1..=7_u16 {
@@ -98,7 +98,7 @@ fn more_than_half_or_half_with_the_initial_leader_decide() {
             if most {
                 assert_eq!(outcome, Some(view(1, 1, there)));
             }
-            // Two parts of one chain never decide both.
+            // Two parts of one chain never both decide.
             let rest = ((1 << relays) - 1) & !part;
             let rest: Vec<u16> = (1..=relays)
                 .filter(|node| rest >> (node - 1) & 1 == 1)
@@ -116,7 +116,7 @@ fn only_members_of_the_view_decide() {
     let mut chain = Chain::of(5);
     let first = chain.propose(&[1, 2, 3], id(1, 1), 3);
     assert_eq!(first, Some(view(1, 1, 3)));
-    // Three of the five relays are polled, but only one of the three members of the view.
+    // Three of the five relays vote, but only one of them is among the view's three members.
     let others = chain.propose(&[3, 4, 5], id(2, 3), 3);
     assert_eq!(others, Some(view(1, 1, 3)), "it may be agreed on");
     let next = chain.propose(&[3, 4, 5], id(3, 3), 3);
@@ -125,7 +125,7 @@ fn only_members_of_the_view_decide() {
         [3, 4, 5].map(|node| chain.knows(node).1),
         [true, false, false]
     );
-    // Two of the three members are polled.
+    // Two of the view's three members vote.
     let members = chain.propose(&[1, 2], id(4, 1), 2);
     assert_eq!(members, Some(view(4, 1, 2)));
 }
@@ -162,7 +162,7 @@ fn a_view_that_may_be_agreed_on_is_decided_again() {
 }
 
 /// Checks that a proposal that reaches all relays is accepted even if most have lost their votes. Otherwise a chain
-/// could never fly again after most relays restarted.
+/// could not fly again after most relays restarted.
 #[test]
 fn all_relays_of_the_mission_are_always_a_view() {
     let mut chain = Chain::of(3);
@@ -229,8 +229,8 @@ fn the_next_proposal_spreads_the_agreed_view() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Checks that the vote of a relay that does not know the newest view does not count. Relay 2 does not know the
-/// newest view and votes first. Relay 3 knows this view and votes later.
+/// Checks that a relay that does not know the newest view has no vote. Relay 2 does not know it and votes first. Relay
+/// 3 knows it and votes later.
 #[test]
 fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);
@@ -268,8 +268,7 @@ fn only_members_may_be_relied_on() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Checks that a refused view proposal is removed from the list of votes. The list is for proposals with an unknown
-/// decision.
+/// Checks that a refused proposal is removed from the list of undecided proposals.
 #[test]
 fn votes_are_kept_until_their_result_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -305,18 +304,18 @@ fn votes_are_kept_until_their_result_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Checks that safety needs the stored votes: without them two views can be in force. Node 3 is a member of the
-/// current view, loses its votes, and votes in the initial view.
+/// Checks that two views can be in force if a relay loses its stored votes. Node 3 is a member of the current view,
+/// loses its votes, and votes in the initial view.
 #[test]
 fn a_relay_without_its_record_may_decide_a_second_view() {
     let mut chain = Chain::of(5);
     assert_eq!(chain.propose(&[3, 4, 5], id(1, 3), 3), Some(view(1, 3, 3)));
     chain.0[2] = Electorate::new(5, 1);
     assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), Some(view(2, 1, 3)));
-    // The other two nodes are two of its three members.
+    // Two of the view's three members vote: the other two nodes.
     chain.0[3].commit();
     assert_eq!(chain.propose(&[4, 5], id(3, 4), 2), Some(view(3, 4, 2)));
-    // With its record the node would have reported that view.
+    // With its record the node would have reported its view.
     let mut kept = Chain::of(5);
     assert_eq!(kept.propose(&[3, 4, 5], id(1, 3), 3), Some(view(1, 3, 3)));
     assert_eq!(kept.propose(&[1, 2, 3], id(2, 1), 3), None);
