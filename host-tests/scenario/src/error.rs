@@ -6,7 +6,7 @@ use toml::Value;
 
 use crate::endpoint::EndpointError;
 
-/// Number of characters to which an error message shortens a quoted value.
+/// Largest number of characters of a quoted value in an error message.
 const QUOTED: usize = 60;
 
 /// A mistake in a scenario file; displayed as exactly one line.
