@@ -347,7 +347,7 @@ impl Bundle<'_> {
         let ardupilot = |name, value| (None, Some((name, value)));
         Ok(vec![
             (Some(("MAV_SYS_ID", INT, own)), Some(("SYSID_THISMAV", own))),
-            // Name from ArduCopter 4.7 on. An autopilot knows either the old or the new name.
+            // Names from ArduCopter 4.7 on. An autopilot knows either the old or the new names.
             ardupilot("MAV_SYSID", own),
             ardupilot("RTL_ALT_M", return_m(index)),
             // TELEM 2, messages for an onboard computer.
