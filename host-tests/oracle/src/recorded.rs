@@ -142,7 +142,7 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a problem as f32 numbers, by which it is found in the file.
+/// Returns all parameters of a problem as f32 numbers. They identify the problem in the file.
 ///
 /// The altitudes of `link` are left out, because relays choose their altitudes in these problems.
 fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {

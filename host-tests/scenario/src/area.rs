@@ -277,7 +277,9 @@ fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// Returns twice the signed area of the triangle a, b, c. The sign tells on which side of a-b the point c is.
+/// Returns twice the signed area of the triangle a, b, c.
+///
+/// The sign is that of the side of a-b that c is on.
 fn turn([a, b]: [[f64; 2]; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }

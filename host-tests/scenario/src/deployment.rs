@@ -83,7 +83,7 @@ pub struct Companion {
     pub reserve_s: Option<f32>,
     /// Flight time with a full battery, s, 1 to 21600.
     pub flight_time_s: Option<f32>,
-    /// Speed of the drone on its way home, m/s, 0.1 to 20.
+    /// Speed of the drone during its return home, m/s, 0.1 to 20.
     pub return_speed_m_s: Option<f32>,
     /// Mean speed of descent for landing, m/s, 0.1 to 20.
     pub descent_m_s: Option<f32>,
@@ -133,7 +133,7 @@ pub struct Ground {
     pub log_file: Option<PathBuf>,
     /// Unix socket at which the ground station reports its status and counters.
     pub status_socket: Option<PathBuf>,
-    /// File to which the traffic on the ground station's port is captured.
+    /// File that captures the traffic on the ground station's port.
     pub capture: Option<PathBuf>,
 }
 

@@ -48,7 +48,7 @@ pub enum Problem {
     Missing,
     /// Two keys that exclude each other are both given, such as a power in W and in dBm.
     SaidTwice,
-    /// A position in latitude and longitude is given without the table `[site]`, to which it relates.
+    /// A position in latitude and longitude is given, but the table `[site]` that it needs is missing.
     NoSite,
     /// The value of a key is a text outside the list of allowed texts.
     UnknownChoice,

@@ -1181,8 +1181,8 @@ pub(super) fn sources(
 
 /// Converts an interferer's latitude and longitude to x and y, m.
 ///
-/// Returns an error if the file has no `[site]`, if the interferer is too far away, or if its height changes the
-/// interference too much.
+/// Errors: no `[site]` in the file, an interferer that is too far away, or a height that changes the interference too
+/// much.
 fn on_earth(
     file: &str,
     table: &str,

@@ -1,12 +1,14 @@
 //! Single hypothetical interferer that replaces several. The paper's "Extension to Multiple Sources of Interference".
 //!
-//! Minimises the integral, over [0, D] and the altitude band, of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - the same summed over the
-//! true sources|. The best p_H at a position is a weighted median ([`Raster::best_power`]); the position is searched on a grid, then
-//! by simplexes from the grid's best local minima and from the true sources. The global minimum may be missed: a test compares
-//! the result with 20 000 random positions in each of 20 scenes.
+//! The fit minimises the integral of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - S| over [0, D] and all altitudes. S is the
+//! sum of the same term over the true interferers. The best p_H at a position is a weighted median
+//! ([`Raster::best_power`]). The position is searched on a grid, and then by simplexes from the grid's best local
+//! minima and from the true interferers. The global minimum may be missed: a test compares the result with 20 000
+//! random positions in each of 20 scenes.
 //!
-//! The paper restricts x_H to [0, D]. Interferers that are all beyond Rx are not well represented there, so here x_H may reach
-//! the outermost interferer. y_H is at most 30 times the size of the scene, where the interference is uniform to a thousandth.
+//! The paper restricts x_H to [0, D]. This does not fit if all interferers are beyond Rx, so here x_H may reach the
+//! outermost interferer. y_H is at most 30 times the size of the scene: the interference is then uniform to a
+//! thousandth.
 
 use super::Source;
 use super::scene::{Place, Scene};
@@ -115,7 +117,7 @@ impl Hypothetical {
 pub struct Fit {
     /// Position x_H of the hypothetical interferer along the line from Tx, m.
     pub x_m: f64,
-    /// Lateral distance y_H of the hypothetical interferer from the line, m, >= 0.
+    /// Distance y_H of the hypothetical interferer from the line Tx-Rx, m, >= 0.
     pub y_m: f64,
     /// Best power of an interferer at this position, and the remaining error.
     pub best_power: BestPower,
@@ -596,7 +598,7 @@ struct Corner {
 /// Minimises `f` by the simplex method. Returns the best point found, never worse than `start`.
 ///
 /// `steps` is the size of the first simplex. The search ends when the values at the corners agree to the relative
-/// `tolerance`, or after `most` steps of at most four evaluations of `f`.
+/// `tolerance`, or after `most` steps. A step takes at most four evaluations of `f`.
 fn minimise(
     f: impl Fn((f64, f64)) -> f64,
     start: (f64, f64),

@@ -37,7 +37,7 @@ fn read(option: &str, file: &Path) -> Result<String, String> {
 
 /// Rejects a key file that users other than its owner and group can read or write.
 ///
-/// A file that is missing or unreadable passes: reading it fails afterwards.
+/// A missing or unreadable file is accepted here; reading it fails later.
 #[cfg(unix)]
 fn check_mode(file: &Path) -> Result<(), String> {
     use std::os::unix::fs::PermissionsExt as _;

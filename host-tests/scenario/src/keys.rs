@@ -337,7 +337,7 @@ impl Key {
         }
     }
 
-    /// Returns those of `keys` that the table may have in place of this required key.
+    /// Returns the keys among `keys` that the table may have in place of this required key.
     pub(super) fn alternatives(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,

@@ -55,8 +55,8 @@ impl Scenario {
     /// Parses a scenario from TOML text; `file_name` is used only in error messages.
     ///
     /// # Errors
-    /// The first mistake found: invalid TOML, an unknown or missing key, a value of the wrong type or out of its range (NaN and
-    /// infinities are out of every range), or keys that contradict each other.
+    /// The first mistake found: invalid TOML, an unknown or missing key, a value of the wrong type or out of its range,
+    /// or keys that contradict each other. NaN and infinities are out of every range.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
         let table = check::table_of(file_name, text)?;
         check::table(file_name, &table)?;

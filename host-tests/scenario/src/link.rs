@@ -1,6 +1,6 @@
 //! Data link: how the hops share the radio, and the data rate that an SINR carries.
 //!
-//! With the bandwidth B, the spectral efficiency b in bit/s/Hz of a [`RateModel`] and N + 1 hops a chain carries
+//! B is the bandwidth, and b the spectral efficiency of a [`RateModel`] in bit/s/Hz. A chain of N + 1 hops carries
 //!
 //! ```text
 //! slots      R = B b(SINR of the worst hop) / (N + 1)    one frequency, equal time slots, as the paper assumes

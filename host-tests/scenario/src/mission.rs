@@ -25,7 +25,7 @@ pub enum Refusal {
     NoHypothetical,
     /// The distance from Tx to Rx is too short for the number of relays at their minimum separation.
     NoRoom {
-        /// Number of relays for which the distance is too short.
+        /// Number of relays that are too many for the distance.
         relays: u16,
         /// Minimum separation of two relays, m.
         apart_m: f32,

@@ -28,9 +28,9 @@ pub struct Corridor {
     pub least_m: f64,
     /// Highest altitude of a relay, m.
     pub most_m: f64,
-    /// Lateral limit to the left of the line, as seen from Tx toward Rx, m, <= 0.
+    /// Smallest lateral position (left limit as seen from Tx toward Rx), m, <= 0.
     pub left_m: f64,
-    /// Lateral limit to the right of the line, as seen from Tx toward Rx, m, >= 0.
+    /// Largest lateral position (right limit as seen from Tx toward Rx), m, >= 0.
     pub right_m: f64,
 }
 
@@ -87,7 +87,7 @@ pub struct Scene {
 /// Position of a relay relative to the line from Tx to Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Distance of the relay from Tx along the line to Rx, m.
+    /// Distance of the relay from Tx toward Rx, m.
     pub x: f64,
     /// Lateral position of the relay, m; positive to the right as seen from Tx toward Rx.
     pub y: f64,
@@ -223,9 +223,9 @@ impl Scene {
 
     /// Returns the linear SIRs of the N + 1 hops from Rx to Tx, with relay k at `places[k - 1]`.
     ///
-    /// Entry k - 1 is the SIR of the hop from node k to node k - 1, with the interference at node k - 1. Node 0 is Tx
-    /// and node N + 1 is Rx. A SIR is infinite if its two nodes share a position. The list is empty unless there is one
-    /// position per relay, and at least one relay.
+    /// Node 0 is Tx, node k relay k, and node N + 1 Rx. Entry k - 1 is the SIR of the hop from node k to node k - 1. A
+    /// SIR is infinite if its two nodes share a position. The list is empty unless there is one position per relay, and
+    /// at least one relay.
     pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
             return Vec::new();

@@ -57,7 +57,7 @@ pub struct Scenario {
     ///
     /// [`Self::interference`] is then their initial knowledge, if any.
     pub listen: Option<ListenSpec>,
-    /// Noise of the receivers: of the relays and of Rx.
+    /// Noise of the receivers, both relays and Rx.
     pub noise: Noise,
     /// Data link, for data rates; `None` if the file has none.
     pub link: Option<Link>,
@@ -139,7 +139,7 @@ pub struct ListenSpec {
     pub following: bool,
     /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
-    /// Half-life of a measurement: age at which it counts half as much as a new one, s, 0.01 to 1e12.
+    /// Age at which a measurement has half the weight of a new one, s, 0.01 to 1e12.
     pub half_life_s: Option<f64>,
     /// Relative error of one interference measurement, 1e-3 to 1.
     pub relative_error: Option<f64>,
@@ -201,8 +201,7 @@ impl Noise {
 
     /// Returns the noise power at the input of a receiver, W.
     ///
-    /// It is k T0 B F, with Boltzmann's constant k, the reference temperature T0, the bandwidth B and the noise
-    /// figure F, or the given power.
+    /// It is the given power, or k T0 B F: Boltzmann's constant, reference temperature, bandwidth and noise figure.
     pub fn receiver_w(&self) -> f64 {
         self.power_dbm.map_or_else(
             || BOLTZMANN * Self::STANDARD_K * self.bandwidth_hz * factor(self.figure_db),
@@ -268,7 +267,7 @@ pub struct Field {
     pub beta: Vec<BetaPoint>,
 }
 
-/// Beta distribution of the interference power at one position on the line.
+/// Beta distribution of the interference power at one x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BetaPoint {
     /// Position along the line from Tx to Rx, m, -1e7 to 1e7.
@@ -402,7 +401,7 @@ pub enum PlannedMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedPlace {
-    /// Distance of the relay from Tx along the line to Rx, m.
+    /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
     /// Lateral position of the relay, m; positive to the right as seen from Tx toward Rx.
     pub y_m: f64,

@@ -32,7 +32,7 @@ const LEAST_STEPS: f64 = 16.0;
 /// Smallest distance between two points of a profile, m.
 const APART_M: f64 = 1e-3;
 
-/// Height, m, by which a parabola's vertex must differ from its ends to become a profile point.
+/// Smallest height of a parabola's vertex above or below its ends, m. A lower vertex is no profile point.
 const VERTEX_M: f64 = 1e-3;
 
 /// Side of a square in which column and row of the elevation model are taken as linear in x and y, m.
@@ -60,7 +60,7 @@ pub struct Ground<'a> {
 /// Antenna of a chain: Tx, a relay or Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Node {
-    /// Distance from Tx along the line to Rx, m.
+    /// Distance from Tx toward Rx, m.
     pub x_m: f64,
     /// Lateral position of the antenna, m; positive to the right as seen from Tx toward Rx.
     pub y_m: f64,
@@ -226,8 +226,8 @@ impl<'a> Ground<'a> {
         let raise_m = self.raise_m(node.x_m);
         let mut highest = self.height_m(node.x_m, node.y_m)?;
         if radius_m > 0.0 {
-            // A polygon outside of the circle by at most a centimetre. Inside a cell the ground has no highest point,
-            // so the highest point of the polygon is on an edge or at a node.
+            // A polygon outside of the circle by at most a centimetre. Inside a cell the ground has no highest point.
+            // So the highest point of the polygon is on an edge or at a node.
             let corners = (std::f64::consts::PI * (50.0 * radius_m).sqrt())
                 .ceil()
                 .max(16.0);
@@ -274,8 +274,8 @@ impl<'a> Ground<'a> {
 
     /// Returns the nodes of the elevation model in a rectangle, as [x, y, height], m.
     ///
-    /// `low` has the least x and y of the rectangle, and `high` the greatest. Nodes for which `is_in` returns false are
-    /// left out. The assumed error of the heights is not added.
+    /// `low` has the least x and y of the rectangle, and `high` the greatest. Nodes are left out if `is_in` returns
+    /// false. The assumed error of the heights is not added.
     ///
     /// # Errors
     /// A text that names a node without a height.

@@ -19,7 +19,7 @@ pub struct HopReport {
     pub clearance_m: f64,
     /// Clearance that a clear hop needs at this obstacle, m.
     pub required_m: f64,
-    /// Distance of the obstacle from Tx along the line to Rx, m.
+    /// Distance of the obstacle from Tx toward Rx, m.
     pub obstacle_x_m: f64,
     /// Lateral position of the worst obstacle, m.
     pub obstacle_y_m: f64,

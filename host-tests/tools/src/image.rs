@@ -9,7 +9,7 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 use uav_relay_block::ADDRESS;
 
-/// Board for which `cargo image` can build a flash image.
+/// Board that `cargo image` supports.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Board {
     /// Name of the board, as given by `--board`.
@@ -28,7 +28,7 @@ pub struct Board {
     pub uf2: Option<Family>,
 }
 
-/// Boards for which `cargo image` can build a flash image.
+/// Boards that `cargo image` supports.
 pub const BOARDS: [Board; 4] = [
     Board {
         name: "stm32f405",

@@ -420,7 +420,7 @@ fn the_worst_case_is_that_of_brute_force() {
         };
         let planned = plan(scenario, &ask(*relays, *is_free)).unwrap();
         let judged = judge.worst(&points(&planned));
-        // The planner's worst case equals that of the grid. Between grid points an interferer may be a little worse.
+        // The planner's worst case equals the grid's. Between grid points an interferer may be a little worse.
         let form = planned.sir() / judged;
         assert!((0.99..=1.0 + 1e-5).contains(&form), "seed {seed}: {form}");
         let brute = judge.best(seed);

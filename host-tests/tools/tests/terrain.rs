@@ -974,7 +974,7 @@ fn drones_return_above_the_ground_beside_the_chain() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
     let cell = 1.0 / 3600.0;
-    // A peak of 900 m at one grid point, 43 m north of the line, in a plain of 500 m with a pit of 450 m.
+    // A peak of 900 m at one grid point, 43 m north of the line Tx-Rx. The plain has 500 m, and a pit of 450 m.
     let north = 47.2 + 10.4 * cell;
     let raster = Raster::geographic(8.49, north, cell, [200, 21]);
     raster.write(&folder.path().join("plain.tif"), |lon, lat| {
@@ -1069,7 +1069,7 @@ fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
         [json, written].map(|json| -> Value { serde_json::from_str(&json).unwrap() });
     assert_eq!(status, Some(0));
     assert!(alone["flight"].is_object() && alone == written, "{alone}");
-    // Relays with one hypothetical interferer fly to other positions than those of the plan.
+    // Relays that use one hypothetical interferer fly to other positions than the planned ones.
     let text = std::fs::read_to_string(EXAMPLE).unwrap();
     let hills = std::path::absolute("../../examples/hills.tif").unwrap();
     let text = text.replace("hills.tif", hills.to_str().unwrap());

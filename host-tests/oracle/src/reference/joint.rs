@@ -11,7 +11,7 @@ use super::link::{Link, received_w};
 /// Limits of the relays' altitudes and lateral positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
-    /// Lowest altitude of a relay, m, > 0. All altitudes are above the ground on which Tx, Rx and the interferer are.
+    /// Lowest altitude of a relay, m, > 0. Altitudes count from the ground; Tx, Rx and interferer are there.
     pub least_m: f64,
     /// Highest altitude of a relay, m, >= `least_m`.
     pub most_m: f64,

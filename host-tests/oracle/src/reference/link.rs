@@ -3,7 +3,7 @@
 /// Relay in a reference link: altitude and transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
-    /// Altitude of the relay, m, > 0, above the ground on which Tx, Rx and the interferer are.
+    /// Altitude of the relay above the ground, m, > 0. Tx, Rx and interferer are on the ground.
     pub altitude_m: f64,
     /// Transmit power of the relay, W, > 0.
     pub power_w: f64,

@@ -70,8 +70,8 @@ impl Link {
 
     /// Returns the positions that relay `k` (2 to N) can have if relay k-1 is within `set`.
     ///
-    /// The hop between the two relays must meet `target`, and relay `k` must be at least `advance` m farther along x
-    /// than relay k-1.
+    /// The hop between the two relays must meet `target`. Relay `k` must be at least `advance` m beyond relay k-1 along
+    /// x.
     fn next_set(&self, k: usize, set: &[Interval], target: f64, advance: f64) -> Vec<Interval> {
         let mut pieces = Vec::new();
         let gap_ends = set

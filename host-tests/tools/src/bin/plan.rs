@@ -607,7 +607,7 @@ enum Altitude {
 }
 
 impl Altitude {
-    /// Returns the method with which relays in flight choose positions at these altitudes.
+    /// Returns the placement method that relays use in flight at these altitudes.
     const fn method(self) -> PlannedMethod {
         match self {
             Self::Given | Self::Terrain => PlannedMethod::Align,
@@ -631,7 +631,7 @@ impl Options {
         }
     }
 
-    /// Returns the requested number of relays, or the target SIR for which it is to be found.
+    /// Returns the requested number of relays, or the target SIR of the request.
     ///
     /// For a requested data rate it is 1 relay; the real number is found later.
     fn number(&self) -> Number {

@@ -257,7 +257,7 @@ impl<'a> Asked<'a> {
             // `adjust` starts from the positions of `align`.
             Method::Align | Method::Adjust => PlannedMethod::Align,
         };
-        // Relays report by themselves that they agree on no positions.
+        // Relays report it themselves if they agree on no positions.
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
@@ -553,7 +553,7 @@ fn new_key() -> Result<[u8; 32], String> {
     Ok(key)
 }
 
-/// Checks that the radio channel is fast enough for `uavs` relays. Wired relays always pass.
+/// Checks that the radio channel is fast enough for `uavs` relays; wires always are.
 ///
 /// `probe_after` is the silence of a neighbour after which a relay probes it.
 fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {

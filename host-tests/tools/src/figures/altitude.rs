@@ -15,7 +15,7 @@ pub const RELAYS: u16 = 50;
 /// Distances of the interferer from the line Tx-Rx, m, one for each curve of the figure.
 pub const OFFSETS_M: [f64; 5] = [100.0, 150.0, 200.0, 300.0, 400.0];
 
-/// Distance of the interferer from the line, m, for which the paper states a best altitude of 220 m.
+/// Distance of the interferer from the line Tx-Rx, m, for the paper's best altitude of 220 m.
 pub const PAPERS_OFFSET_M: f64 = 150.0;
 
 /// Table row: SIR of the chain at one common altitude, with the interferer at one offset.
@@ -27,7 +27,7 @@ struct Row {
     sir_linear: f64,
     /// SIR of the worst hop with the paper's step, linear; `None` far from the paper's best altitude.
     ///
-    /// With this step the target SIR falls by 0.1 from one pass of messages along the chain to the next.
+    /// With this step the target SIR falls by 0.1 for each series of messages along the chain.
     sir_by_step_linear: Option<f64>,
 }
 

@@ -46,7 +46,7 @@ struct Row {
 
 /// Table row: best SIRs of one relay with four kinds of freedom.
 ///
-/// The relay is on the line or beside it, at the lowest altitude or at any altitude.
+/// The relay has y = 0 or any permitted y, at the lowest altitude or at any permitted altitude.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
@@ -80,8 +80,7 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
 
 /// Returns the relay's best positions at the lowest altitude.
 ///
-/// There is one for each interferer's offset and each limit of the relay's distance from the line. The limits are
-/// `step_m` apart.
+/// There is one for each interferer's offset and each limit of the relay's |y|. The limits are `step_m` apart.
 fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
@@ -101,7 +100,7 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the relay's best SIRs for interferers at distances from the line that are `step_m` apart.
+/// Returns the relay's best SIRs for interferers at several y, which are `step_m` apart.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
@@ -178,7 +177,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
     })
 }
 
-/// Computes the figure of the SIR that a relay gains if it may leave the line or the lowest altitude.
+/// Computes the figure of the SIR gain of a relay with free y or free altitude.
 pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {

@@ -203,7 +203,7 @@ const STEPS: f64 = 6.0;
 /// A longer axis has labels at powers of ten only.
 const FEW_DECADES: f64 = 2.4;
 
-/// Distance by which a tick may be beyond an end of the axis, as a fraction of the axis, for rounding.
+/// Largest distance of a tick beyond the end of an axis, due to rounding, as a fraction of the axis.
 const ROUNDING: f64 = 1e-9;
 
 /// Scale of an axis, linear or logarithmic.

@@ -18,7 +18,7 @@ pub const STEP: f64 = 0.1;
 struct Row {
     relays: u16,
     sweep: u32,
-    /// Target SIR of every hop in this pass, linear.
+    /// Target SIR of every hop in this pass of messages, linear.
     target_linear: f32,
     /// SIR of the worst hop, linear, with every relay as far toward Rx as the target allows.
     sir_linear: f64,
@@ -50,7 +50,7 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects the passes that the figure draws; the last passes are closer together.
+/// Selects the passes of messages that the figure draws; the last ones are closer together.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()

@@ -10,7 +10,7 @@ use super::walk::{Flown, fly};
 use super::{convergence, paper};
 use uav_relay_scenario::Scenario;
 
-/// Numbers of relays for which the figure shows the cost.
+/// Numbers of relays in the figure of the cost.
 pub const RELAYS: [u16; 10] = [1, 2, 3, 5, 8, 14, 24, 40, 65, 100];
 
 /// Table row: messages and bytes of a chain, for three ways to choose the target SIRs.

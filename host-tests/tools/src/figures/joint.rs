@@ -11,7 +11,7 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use super::walk::fly;
 
-/// Numbers of relays for which the figure compares the methods.
+/// Numbers of relays in the comparison.
 pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
 
 /// Largest number of rounds of Algorithm 2.

@@ -43,9 +43,9 @@ struct Row {
     field: Kind,
     relays: u16,
     sweep: u32,
-    /// Target of every hop's expected SIR in this pass, linear.
+    /// Target of every hop's expected SIR in this pass of messages, linear.
     target_linear: f32,
-    /// Expected SIR of the worst hop after this pass, linear.
+    /// Expected SIR of the worst hop after this pass of messages, linear.
     sir_linear: f64,
 }
 

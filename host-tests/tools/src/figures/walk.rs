@@ -67,9 +67,9 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
 /// Pass of messages along the chain in Algorithm 1: its target SIR and the resulting chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the pass, from 1.
+    /// Number of the pass of messages, from 1.
     pub number: u32,
-    /// Target SIR of every hop in this pass, linear.
+    /// Target SIR of every hop in this pass of messages, linear.
     pub target: f32,
     /// Chain with each relay as far from Tx as the target allows; `None` if a hop cannot meet it.
     pub chain: Option<Chain>,

@@ -55,8 +55,8 @@ struct Turn<'a> {
 /// altitude moves along x and sideways only. `None` unless `start` has one position per relay and at least one relay.
 ///
 /// The search ends after 200 rounds, or after three rounds in a row that each gain less than a millionth. A round is 2
-/// N moves. A move computes about 50 SIRs at one altitude, 2 400 in a range of altitudes, and as many again with
-/// lateral positions.
+/// N moves. A move computes about 50 SIRs at one altitude, and 2 400 in a range of altitudes. Free lateral positions
+/// take another 2 400.
 pub fn polish(
     scene: &Scene,
     start: &[impl Copy + Into<Place>],

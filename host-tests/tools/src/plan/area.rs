@@ -26,7 +26,7 @@ use uav_relay_sim::report::db;
 use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, fewest_of, fitted_radio, source};
 use crate::multi_interferer::{best_common_altitude, optimum};
 
-/// Largest number of relays for which positions are searched on a grid.
+/// Largest number of relays in a search on a grid.
 const MOST_SEARCHED: u16 = 50;
 
 /// Quantile that is reported if no other quantile is requested.
@@ -61,7 +61,7 @@ const RESTARTS: u32 = 5;
 /// Width of the narrowest window along x, as a fraction of the distance Tx-Rx.
 const NARROWEST: f64 = 1e-7;
 
-/// Criterion by which positions are chosen.
+/// Criterion for the choice of positions.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Criterion {
     /// Fraction of cases, 0.5 to 0.99, that are to have at least the maximised SIR.

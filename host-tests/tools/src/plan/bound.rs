@@ -32,7 +32,7 @@ const MOST_CELLS: usize = 60_000;
 /// The smallest cells are some 1e-8 of the distance from Tx to Rx.
 const MOST_LEVELS: usize = 10;
 
-/// Largest number of relays for which a proof is tried.
+/// Largest number of relays in a proof. With more relays no proof is tried.
 const MOST_RELAYS: usize = 200;
 
 /// Allowance for rounding errors, as a fraction of a squared length.

@@ -25,7 +25,7 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
-/// Largest relative excess of time per bit for which a number of relays gets a precise search.
+/// Largest relative excess of time per bit; with more, a number of relays gets no precise search.
 ///
 /// The times per bit are those on a coarse grid. The excess is relative to the smallest time of all numbers of relays.
 /// A precise search cannot make up for a larger excess.
@@ -82,7 +82,7 @@ impl<'a> Carried<'a> {
         table.as_ref()
     }
 
-    /// Returns the largest number of relays for which a precise search is worthwhile.
+    /// Returns the largest number of relays that deserves a precise search.
     ///
     /// With more relays, one bit takes over 5 % more time on the coarse grid than with the best number. A precise
     /// search cannot make up for this. It is used for fitted time slots (as long as each hop needs).

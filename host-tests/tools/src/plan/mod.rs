@@ -181,7 +181,7 @@ pub struct Fitted {
 /// Result of the planner: positions of the relays and SIRs of the hops.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Plan {
-    /// Mission for which the relays are planned.
+    /// Mission of the planned relays.
     pub mission: Mission,
     /// Positions and profiles (power, altitude) of the relays; relay 1, next to Tx, is first.
     pub places: Vec<(Placement, Profile)>,

@@ -30,7 +30,7 @@ use uav_relay_scenario::scene::Scene;
 /// Best position of the only relay, for data in both directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Best {
-    /// Distance of the relay from Tx along the line to Rx, m.
+    /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
     /// Reason for the position: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
     pub case: u8,

@@ -25,7 +25,7 @@ use uav_relay_terrain::profile::{Ground, Node, bulge_m};
 use super::terrain::Elevation;
 use super::{NoPlan, Number, Plan, PlanRequest, Why, area};
 
-/// Largest number of relays for which positions over terrain are searched.
+/// Largest number of relays in a search over terrain.
 pub const MOST_RELAYS: u16 = 50;
 
 /// Number of altitudes of the first grid at each x.

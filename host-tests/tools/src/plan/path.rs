@@ -52,7 +52,7 @@ const NARROWEST: f64 = 1e-7;
 /// Rounding error allowed in the distance of two positions, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 1.2e-7;
 
-/// Weight of a very small extra time by which, of equal times, the one with the higher SIR is better.
+/// Weight of a very small extra time: of equal times, the one with the higher SIR is then better.
 ///
 /// Hops at the same rate step of a radio have equal times.
 const GUIDE: f64 = 1e-3;

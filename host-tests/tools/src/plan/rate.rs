@@ -16,19 +16,19 @@ use uav_relay_sim::report::HopSlots;
 use super::carried::{Carried, carries_no};
 use super::{NoPlan, Number, Plan, PlanRequest, source};
 
-/// Largest number of relays for which rates are computed, if a plan takes milliseconds.
+/// Largest number of relays tried, if a plan takes milliseconds.
 const MOST_FAST: u16 = 200;
 
-/// Largest number of relays for which rates are computed, if a plan takes seconds.
+/// Largest number of relays tried, if a plan takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Largest number of relays for which rates are computed, if positions are optimised for the rate.
+/// Largest number of relays tried, if positions are optimised for the rate.
 const MOST_SEARCHED: u16 = 60;
 
 /// Number of relays up to which rates are always computed with fitted time slots.
 ///
 /// A fitted slot is as long as its hop needs. The list of rates is shorter only if so many relays do not fit between Tx
-/// and Rx, or if it is proven that more relays do not increase the rate.
+/// and Rx, or if more relays provably do not increase the rate.
 const LEAST_LISTED: u16 = 10;
 
 /// Data rate of a chain, bit/s.
@@ -235,7 +235,7 @@ fn is_single(scenario: &Scenario) -> bool {
     matches!(&scenario.interference, Interference::Sources(sources) if sources.len() == 1)
 }
 
-/// Returns the largest number of relays for which the planner computes the data rate.
+/// Returns the largest number of relays that the planner tries.
 fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     let is_several =
         matches!(scenario.interference, Interference::Sources(_)) && !is_single(scenario);
@@ -251,7 +251,7 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
 /// Relative gain in rate from which on a larger number of relays counts as better.
 const RISE: f64 = 1e-4;
 
-/// Largest number of relays for which [`carry_no_more`] looks for a proof.
+/// Largest number of relays in a proof by [`carry_no_more`].
 const MOST_PROVEN: u16 = MOST_FAST;
 
 /// Returns true if it is proven that no number of relays up to `tried_uavs` carries more than `best`.

@@ -311,14 +311,14 @@ pub struct PlanReport {
     pub best_sir_db: Option<f64>,
     /// SIR of the plan's worst hop, linear.
     ///
-    /// In a plan for both directions, hops of both directions count, and an SIR toward Tx is first divided by the
-    /// required fraction of the SIR toward Rx.
+    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
+    /// fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the plan's worst hop, dB.
     ///
-    /// In a plan for both directions, hops of both directions count, and an SIR toward Tx is first divided by the
-    /// required fraction of the SIR toward Rx.
+    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
+    /// fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
     /// SIRs in the direction from Rx to Tx; absent if the interference at Tx is unknown.

@@ -323,8 +323,8 @@ impl Search<'_> {
 
     /// Returns those of `labels` (first hops of chains) that can lead to the best chain.
     ///
-    /// A label is left out if another label ends farther from Tx, takes no more time, and receives the next node from
-    /// as far away in the direction to Tx.
+    /// A label is left out if another label ends farther from Tx, takes no more time, and is no worse for data to Tx.
+    /// It is no worse if it receives the next node from as far away.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -350,8 +350,8 @@ impl Search<'_> {
 
 /// Table of the farthest x of the next node that a relay can receive in the direction to Tx.
 ///
-/// It depends on the relay's x and on the rate step. The search uses it to decide if a relay at a smaller x is worse
-/// than one at a larger x with no more time.
+/// It depends on the relay's x and on the rate step. The search uses it to compare a relay at a smaller x with one at a
+/// larger x.
 struct Backward {
     hop: Hop,
     /// Largest x of the next node, m, at which a relay at a grid point receives it at a rate step.
@@ -438,7 +438,7 @@ fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     to.x - squared.sqrt()
 }
 
-/// Returns the longest hop along x, m, on which `to` receives the next node with the SINR `sinr`.
+/// Returns the longest hop along x, m, from the next node to `to` with the SINR `sinr`.
 ///
 /// `None` if the next node is too weak at any x.
 fn reach(hop: &Hop, sinr: f64, to: Point) -> Option<f64> {

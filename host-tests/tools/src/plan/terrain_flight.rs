@@ -31,13 +31,13 @@ const LEVELS: u32 = 40;
 /// Largest number of searches for altitudes. Each uses the x that the relays choose at the previous altitudes.
 const ROUNDS: u32 = 6;
 
-/// First and last step, m, by which the search changes the altitude of one relay.
+/// First and last change of one relay's altitude in the search, m.
 const STEPS_M: [f64; 2] = [16.0, 0.5];
 
 /// Largest relative loss of SIR that is accepted for higher, safer altitudes: 0.01 dB.
 const SLACK: f64 = 0.0023;
 
-/// Least relative gain in SIR for which the search accepts other altitudes.
+/// Smallest relative gain in SIR that makes the search accept other altitudes.
 const GAIN: f64 = 1e-4;
 
 /// Explanation of "room" for the user.
@@ -167,9 +167,9 @@ pub fn with_altitudes(
 pub struct FlownRelay {
     /// Number of the relay; 1 is next to Tx.
     pub index: u16,
-    /// Distance of its position from Tx along the line to Rx, m.
+    /// Distance of its position from Tx toward Rx, m.
     pub x_m: f32,
-    /// Altitude of its position above the line between the sites, m.
+    /// Altitude of its position above the straight line Tx-Rx, m.
     pub altitude_m: f32,
     /// Room, m: interval of x in which no hop gets worse while the neighbours are in their rooms.
     ///

@@ -146,7 +146,7 @@ impl Flight {
         })
     }
 
-    /// Sets the method by which the relays choose their positions.
+    /// Sets the placement method of the relays.
     pub fn by(self, method: Method) -> Self {
         Self { method, ..self }
     }
@@ -221,7 +221,7 @@ impl Flight {
         &self.held
     }
 
-    /// Returns the method that the relays choose their positions by.
+    /// Returns the placement method of the relays.
     pub const fn method(&self) -> Method {
         self.method
     }

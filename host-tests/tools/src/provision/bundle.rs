@@ -51,7 +51,7 @@ pub struct Bundle<'a> {
     pub uavs: u16,
     /// Network number of the relays.
     pub network: u16,
-    /// Method by which the relays choose their positions.
+    /// Placement method of the relays.
     pub method: &'a str,
     /// Mission that the relays load.
     pub mission: &'a Mission,

@@ -107,7 +107,7 @@ pub struct Heading {
     pub uavs: u16,
     /// Network number of the relays.
     pub network: u16,
-    /// Method that the relays choose their positions by, as named on the command line.
+    /// Placement method of the relays, as named on the command line.
     pub method: String,
     /// True if the relays sign their frames.
     pub signed: bool,

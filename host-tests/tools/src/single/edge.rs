@@ -80,8 +80,8 @@ impl Edge {
 
     /// Returns the position on the edge with the best SIR of the worse hop.
     ///
-    /// Work: at most 16 evaluations of both hops, and 42 more for each interval in which one SIR rises, the other
-    /// falls, and they cross. Without noise there is one such interval for x and for the altitude, and two for y.
+    /// Work: at most 16 evaluations of both hops, and 42 more for each interval with a crossing of the two SIRs.
+    /// Without noise there is one such interval for x and for the altitude, and two for y.
     pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,

@@ -39,7 +39,7 @@ impl Real for f64 {}
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// It contains the value up to which `holds` returns true. `holds` should be true at `low` and false at `high`.
+/// `holds` should be true at `low` and false at `high`. It changes between the returned ends.
 pub(super) fn bisected<T: Real>(
     low: T,
     high: T,

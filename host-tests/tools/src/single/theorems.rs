@@ -344,7 +344,7 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     Some(best)
 }
 
-/// Values of the power ratio p_t / p_u, linear, at which the case of the optimal x changes.
+/// Limits of the power ratio p_t / p_u, linear, between the cases of the optimal x.
 ///
 /// p_t and p_u are the powers of Tx and relay. The cases are those of the paper's Corollary 1.
 #[derive(Clone, Copy, PartialEq, Debug)]

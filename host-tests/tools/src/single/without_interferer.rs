@@ -56,8 +56,8 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
         (first, second)
     };
     let r = second_w / first_w;
-    // If the SNRs are equal nowhere between Tx and Rx, the root is beyond the optimal end, even if the discriminant is
-    // cut to 0.
+    // If the SNRs are equal nowhere between Tx and Rx, the root is beyond the optimal end. This holds with the
+    // discriminant cut to 0, too.
     let root = sqrt(r * square(d) - square((1.0 - r) * h));
     let x_m = ((square(d) + (1.0 - r) * square(h)) / (d + root))
         .max(0.0)

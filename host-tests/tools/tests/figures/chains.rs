@@ -212,7 +212,7 @@ fn the_cost_of_settling_is_that_of_the_schedules() {
         let relays = row.number("relays");
         let is_that = |n: &u16| f64::from(*n) == relays;
         let link = Link::paper(usize::from((1..=100).find(is_that).unwrap()));
-        // With a hundred relays the reference would take half a minute for as many passes of messages.
+        // With a hundred relays the reference would take half a minute for this number of passes of messages.
         let tried = if relays < 15.0 {
             let (tried, target) = link.fixed_step(0.1).unwrap();
             within(row.number("step_sir_linear"), target, 1e-5, 1e-5);

@@ -89,9 +89,9 @@ impl StochasticLink {
 
     /// Returns the largest value of [`StochasticLink::backward_sir`] that a search over targets finds.
     ///
-    /// The search tries `points` targets from the ceiling down to 1e-8 of it, evenly spaced in their logarithm, and
-    /// then four times as many around the best one. Use it for interference with which the SIR has several maxima over
-    /// the target. It can miss a maximum that is narrower than the spacing.
+    /// The search tries `points` targets from the ceiling down to 1e-8 of it, evenly spaced in their logarithm. Then it
+    /// tries four times as many around the best one. Use it if the SIR has several maxima over the target. It can miss
+    /// a maximum that is narrower than the spacing.
     pub fn backward_best(&self, points: u32) -> f64 {
         let (mut low, mut high) = (1e-8_f64.ln(), 0.0);
         let mut best = (0.0, 0.0);

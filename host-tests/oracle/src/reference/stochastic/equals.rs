@@ -6,8 +6,7 @@ impl StochasticLink {
     /// Returns the best expected SIR (linear) of equal relays if the interference is the same everywhere.
     ///
     /// All hops then have the same SIR, and together span the distance from Tx to Rx. The result is at most the SIR of
-    /// the first hop with its relay straight above Tx, and of the last hop with its relay straight above Rx. At most
-    /// about 2000 evaluations.
+    /// a first hop right above Tx, and of a last hop from right above Rx. At most about 2000 evaluations.
     ///
     /// `None` without relays, if the relays differ, or if Upsilon differs in the table.
     pub fn iid_optimum(&self) -> Option<f64> {
