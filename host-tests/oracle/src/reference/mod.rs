@@ -10,10 +10,10 @@
 //! So the SIR only falls, only rises, has one minimum (interferer ahead) or one maximum (interferer behind), and
 //! bisection is safe.
 //!
-//! With noise nu = N eta / P the derivative has the sign of u d^2 - (u^2 + a^2 - b^2) d - u b^2 - nu d s^2, s = (d -
-//! u)^2 + a^2. Here the interferer is u ahead of the sender and a sideways, and b is the difference in height. Divided
-//! by d, this expression is concave for u > 0, so there are at most two extrema, a minimum and then a maximum. For u <
-//! 0 each of its terms falls, so there is at most one.
+//! With noise nu = N eta / P and s = (d - u)^2 + a^2, the derivative has the sign of u d^2 - (u^2 + a^2 - b^2) d - u
+//! b^2 - nu d s^2. Here the interferer is u ahead of the sender and a sideways, and b is the difference in height.
+//! Divided by d, this expression is concave for u > 0, so there are at most two extrema, a minimum and then a maximum.
+//! For u < 0 each of its terms falls, so there is at most one.
 //!
 //! No relay is behind its predecessor (0 <= `x_1` <= ... <= `x_N` <= D). Only `Link::optimum_apart` and the brute-force search keep
 //! the minimum separation.

@@ -16,9 +16,9 @@
 //! 1. Above Rx, where SIR_2 is maximal, if SIR_1 is no worse there.
 //! 2. At the maximum of SIR_1, its only one, if SIR_2 is no worse there: t = 2 h^2 / (sqrt(q) + sqrt(q + 4 h^2)) from Tx,
 //!    straight away from the interferer.
-//! 3. Otherwise where two level circles touch with disjoint insides and SIR_1 = SIR_2. No other position is as good, because two
-//!    such sets share only the touching point. This holds for two discs (k > 0), and for the disc of SIR_2 within the disc that
-//!    SIR_1 excludes (k < 0).
+//! 3. Otherwise where a circle of constant SIR_1 touches one of constant SIR_2, with SIR_1 = SIR_2. No other position
+//!    is as good, because the two sets of positions with higher SIRs share only the touching point. This holds for two
+//!    discs (k > 0), and for the disc of SIR_2 within the disc that SIR_1 excludes (k < 0).
 //!
 //! Any other position can be improved: either one SIR is worse and can rise, or both can rise together.
 //!

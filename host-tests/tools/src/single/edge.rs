@@ -1,6 +1,73 @@
 //! Edges and faces of the box of a single relay's allowed positions.
 //!
 //! This module finds the best position on an edge, and with noise inside a face.
+//!
+//! # Edge
+//!
+//! One of x, y and altitude is free. The other two are fixed.
+//!
+//! With t the free coordinate, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 has one
+//! extremum, at E. SIR_1 has extrema where P t^2 - (P^2 + a - b) t - P b = 0, at two points whose product is -b.
+//! Between these three points both are monotone. The worse SIR is therefore largest at an end of such an interval, or
+//! at the one point where they cross. With noise SIR_1 may have three extrema.
+//!
+//! | free | P | a | b | E |
+//! | --- | --- | --- | --- | --- |
+//! | x | X | (Y - y)^2 + h^2 | y^2 + h^2 | D |
+//! | y | Y | (X - x)^2 + h^2 | x^2 + h^2 | 0 |
+//! | h | 0 | (X - x)^2 + (Y - y)^2 | x^2 + y^2 | 0 |
+//!
+//! # Extrema of SIR_1 on an edge with noise
+//!
+//! In the same notation, with s = (t - P)^2 + a, the slope of SIR_1 has the sign of
+//!
+//! ```text
+//! P t^2 - (P^2 + a - b) t - P b - nu t s^2
+//! ```
+//!
+//! For P > 0 (otherwise everything is mirrored) this over t, phi, is concave for t > 0, since s is convex and not negative, and
+//! so is s^2. So there are at most two extrema, a minimum and a maximum, none before the noise-free minimum. For t < 0 phi falls
+//! with |t| from a positive value: one extremum, closer than the noise-free one. For P = 0 the sign is that of -t (a - b + nu
+//! (t^2 + a)^2).
+//!
+//! # Corridor at one altitude
+//!
+//! If the touching position is outside of the corridor, a relay with lateral freedom and noise is placed by a search at
+//! one altitude.
+//!
+//! Without noise no position inside the rectangle can then be optimal. With noise there may be a second position at
+//! which two level lines touch from within, on the other side of the interferer's line; near Y = 0 it is almost the
+//! mirror image of the first. Their number is not proven, so the plane is searched. The best x for each y is computed
+//! exactly, as on an edge. The best y is searched on values that are closer near y = 0, and by golden section around
+//! the three best.
+//!
+//! # Touching position in a vertical plane
+//!
+//! With noise there may be a position inside the box at which the level lines of both SIRs touch.
+//!
+//! In the plane y = y0, SIR_2 is constant on the circle of radius r about (D, y0), and with z = x - D both squared distances are
+//! linear in z:
+//!
+//! ```text
+//! l = r^2 + y0^2 + D^2 + 2 D z               from Tx
+//! s = r^2 + (D - X)^2 + (y0 - Y)^2 + 2 (D - X) z    from the interferer
+//! ```
+//!
+//! The slope of SIR_1 = A s / (l (1 + nu s)) by z has the sign of (D - X) l - D s - D nu s^2. The sum of the first two terms does
+//! not depend on z:
+//!
+//! ```text
+//! T = (D - X) y0^2 - X r^2 + D ((D - X) X - (y0 - Y)^2)
+//! ```
+//!
+//! Without noise SIR_1 is monotone along the circle, and no position inside the box is optimal: Theorem 3 as corrected. With
+//! noise and X < D it rises up to s = sqrt(T / (D nu)) and falls beyond; this maximum is above the ground if |z| < r. For X >= D
+//! the sign is negative.
+//!
+//! SIR_1 has no maximum off the ground: its slope by h is 0 only where l = s (1 + nu s), and then that by x only for X = 0, where
+//! it is the sum of two terms that are not. So the maximum on a circle is that of its inside, and does not fall with r, while
+//! SIR_2 does. They are equal at one r, found by bisection. A position inside the box that cannot be improved must be this one:
+//! both slopes are opposite there, so SIR_1 is stationary along the circle, and the SIRs are equal.
 
 use uav_relay::{Band, Interferer, Mission, Placement};
 use uav_relay_scenario::number::narrow;

@@ -1,6 +1,7 @@
-//! Extrema of SIR_1, the SIR of the first hop, along a line.
+//! Extrema of SIR_1, the SIR of the first hop, along a straight line.
 //!
-//! [`first_hop_turn`] returns those along x >= 0 at one altitude: the paper's Lemma 2, for any interferer position and with noise.
+//! [`first_hop_turn`] returns them for x >= 0 at one altitude. This is the paper's Lemma 2, for any interferer position
+//! and with noise.
 //!
 //! With s = (X - x)^2 + Y^2 + h^2 and q = X^2 + Y^2 the slope of SIR_1 = A s / ((x^2 + h^2)(1 + nu s)) has the sign of
 //!
@@ -12,9 +13,9 @@
 //!
 //! - X < 0: the expression falls with x from -X h^2 > 0 at Tx, so SIR_1 still has a single maximum, closer to Tx.
 //! - X = 0: the expression is negative.
-//! - X > 0: divided by x it is phi = X x - q - X h^2 / x - nu s^2, which is concave because s is convex and not negative, and so
-//!   is s^2. So SIR_1 falls to a minimum, rises to a maximum and then falls, or it only falls. No root is before the noise-free
-//!   minimum, where the sum of the first three terms is negative.
+//! - X > 0: divided by x it is phi = X x - q - X h^2 / x - nu s^2. This is concave, because s is convex and not
+//!   negative, so that s^2 is convex, too. So SIR_1 falls to a minimum, rises to a maximum and then falls, or it only
+//!   falls. No root is before the noise-free minimum, where the sum of the first three terms is negative.
 
 use std::ops::{Add, Div, Mul, Sub};
 

@@ -10,10 +10,10 @@
 //! | altitude, noise only | [`without_interferer`] | the paper's special case without interference |
 //!
 //! They use the locus of equal SIRs ([`theorems::equal_altitudes`], Lemma 1) and the extrema of the first hop's SIR
-//! ([`extrema::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which the cases
-//! change. SIR_2 always rises with x and falls with the altitude. With receiver noise SIR_1 may have one more extremum, and the
-//! optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise but
-//! [`without_interferer::best_in_noise`], which has its own.
+//! ([`extrema::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which
+//! the cases change. SIR_2 always rises with x and falls with the altitude. With receiver noise SIR_1 may have one more
+//! extremum, and the optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise, except
+//! [`without_interferer::best_in_noise`], which has a noise argument.
 
 pub mod aside;
 mod edge;

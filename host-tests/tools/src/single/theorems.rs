@@ -4,15 +4,16 @@
 //!
 //! [`best_at_altitude`] has the optimum.
 //!
-//! SIR_2 rises with x. For X > 0 SIR_1 falls to a minimum and rises beyond, so the worse one is maximal where they cross before
-//! the minimum, or above Rx. With the interferer behind Tx (X < 0), which the paper omits, SIR_1 rises to a maximum and falls
-//! beyond. Up to the maximum both rise, so the optimum is the maximum, the crossing beyond it, or above Rx.
+//! SIR_2 rises with x. For X > 0 SIR_1 falls to a minimum and rises beyond. The worse SIR is therefore largest where
+//! they cross before the minimum, or above Rx. The paper omits an interferer behind Tx (X < 0). SIR_1 then rises to a
+//! maximum and falls beyond. Up to the maximum both rise, so the optimum is the maximum, the crossing beyond it, or
+//! above Rx.
 //!
-//! With noise SIR_1 finally falls: beyond its minimum it has a maximum, or it has neither. Up to the maximum both rise; beyond,
-//! the optimum is the maximum, the crossing, or above Rx.
+//! With noise SIR_1 falls at last: it has a minimum and then a maximum, or neither. Between minimum and maximum both
+//! rise. So beyond the minimum, the optimum is the maximum, the crossing after it, or above Rx.
 //!
-//! The crossing is a root of the paper's quartic. Its coefficients cancel in f32, but the SIRs themselves do not, so the root is
-//! found by bisection of an interval on which their difference changes its sign once.
+//! The crossing is a root of the paper's quartic. Its coefficients lose their digits in f32, but the SIRs do not. The
+//! root is therefore found by bisection of an interval in which the difference of the SIRs changes its sign once.
 //!
 //! Accuracy: `theorem_1_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 //!
@@ -20,12 +21,13 @@
 //!
 //! [`best_at_x`] has the optimum.
 //!
-//! SIR_2 falls with the altitude. SIR_1 = A (a + h^2) / (b + h^2) with a = (x - X)^2 + Y^2 and b = x^2 falls too, unless X > 0
-//! and x is beyond the paper's Psi^h = (X^2 + Y^2) / 2X. There it rises, and the worse one is maximal where they are equal (Lemma
-//! 1), or at an end of the band.
+//! SIR_2 falls with the altitude. SIR_1 = A (a + h^2) / (b + h^2) with a = (x - X)^2 + Y^2 and b = x^2 falls too,
+//! unless X > 0 and x is beyond the paper's Psi^h = (X^2 + Y^2) / 2X. There it rises, and the worse SIR is largest
+//! where they are equal (Lemma 1), or at an end of the permitted altitudes.
 //!
-//! With noise SIR_1 = A (a + h^2) / ((b + h^2)(1 + nu (a + h^2))) rises only while nu (a + h^2)^2 < b - a, and falls above that,
-//! as SIR_2 does. So no higher altitude is better, and below it everything is as without noise.
+//! With noise SIR_1 = A (a + h^2) / ((b + h^2)(1 + nu (a + h^2))) rises only while nu (a + h^2)^2 < b - a, and falls
+//! above that altitude, as SIR_2 does. So no higher altitude is better. Below that altitude the solution is as without
+//! noise.
 //!
 //! Accuracy: `theorem_2_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 //!
@@ -33,15 +35,18 @@
 //!
 //! [`best_free`] has the optimum.
 //!
-//! The optimum is on the edge of the box [0, D] x band. Inside, SIR_1 and SIR_2 would have to be equal with opposite slopes,
-//! since neither has a stationary point there: their level lines would touch. But those of SIR_1 are circles about ground points,
-//! and those of SIR_2 circles about Rx, and such circles touch on the ground only. Two of the printed cases miss this, and are
-//! wrong (by a factor of 17 in the first counterexample of the tests).
+//! The optimum is on an edge of the rectangle of allowed x and altitudes. Inside, SIR_1 and SIR_2 would have to be
+//! equal with opposite slopes, since neither has a stationary point there. Their curves of constant SIR would touch.
+//! But for SIR_1 these are circles about ground points, and for SIR_2 circles about Rx. Such circles touch on the
+//! ground only. Two of the printed cases miss this, and are wrong (by a factor of 17 in the first counterexample of the
+//! tests).
 //!
-//! On the edges Theorems 1 and 2 are exact, and the best of the edges is the optimum. Right above Tx both SIRs fall with the
-//! altitude, so only the lowest position of that edge counts, which is on the lowest edge too: three edges are left.
+//! On the edges Theorems 1 and 2 are exact, and the best of the edges is the optimum. Right above Tx both SIRs fall
+//! with the altitude, so only the lowest position of that edge counts. It is also on the lowest edge, so three edges
+//! are left.
 //!
-//! With noise the level lines of SIR_1 are no circles, and there is one position inside at which they may touch: see `edge`.
+//! With noise the curves of constant SIR_1 are no circles. They may then touch those of SIR_2 at one position inside:
+//! see `edge`.
 //!
 //! Accuracy: `theorem_3_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 //!
@@ -49,8 +54,9 @@
 //!
 //! [`power_ratios`] are the ratios p_t / p_u at which the cases of Corollary 1 change.
 //!
-//! SIR_1 / SIR_2 is proportional to p_t / p_u, so each is the ratio at which the two are equal at one position: above Tx (C_1),
-//! above Rx (C_2), and at the minimum of SIR_1 (C_3). The paper prints them as formulas; here they are computed from the SIRs.
+//! SIR_1 / SIR_2 is proportional to p_t / p_u. With each ratio the two are equal at one position: above Tx (C_1), above
+//! Rx (C_2), and at the minimum of SIR_1 (C_3). The paper prints them as formulas; here they are computed from the
+//! SIRs.
 //!
 //! # Locus of equal SIR of both hops: Lemma 1
 //!

@@ -13,14 +13,14 @@
 //!
 //! # Field: Algorithm 3, as corrected, and its limit
 //!
-//! With one relay E(SIR_2) rises with x, so a target gamma determines x = D - sqrt(A / gamma - h^2), where E(SIR_2) is gamma. The
-//! printed algorithm takes the first gamma, from the top, that E(SIR_1) meets there. That is not optimal: a position whose
-//! E(SIR_1) is below its gamma may still be better than one that meets a lower gamma. So it has to continue until gamma is at
-//! most the best min(gamma, E(SIR_1)) so far.
+//! With one relay E(SIR_2) rises with x, so a target gamma determines x = D - sqrt(A / gamma - h^2), where E(SIR_2) is
+//! gamma. The printed algorithm takes the first gamma, from the top, that E(SIR_1) meets there. That is not optimal: a
+//! position whose E(SIR_1) is below its gamma may still be better than one that meets a lower gamma. The corrected
+//! algorithm continues until gamma is at most the best min(gamma, E(SIR_1)) so far.
 //!
-//! [`best_in_field`] needs no step. Between two points of the field E(SIR_1) = c (a + b x) / (x^2 + h^2), whose extrema are the
-//! roots of a quadratic. So each section has intervals on which it is monotone, and the optimum of an interval is at an end or
-//! where the two SIRs cross. [`stepped`] is the algorithm.
+//! [`best_in_field`] needs no step. Between two points of the field E(SIR_1) = c (a + b x) / (x^2 + h^2), and its
+//! extrema are the roots of a quadratic. Between two extrema it is monotone, so the optimum is at an end or where the
+//! two SIRs cross. [`stepped`] is the algorithm.
 //!
 //! Accuracy: `host-tests/tests/single.rs`, against a dense search in f64.
 
