@@ -996,7 +996,6 @@ fn far_from(line: &Line, [lat, lon]: [f64; 2]) -> String {
     )
 }
 
-/// Converts the `[[no_fly]]` tables of a file.
 fn no_fly(
     file: &str,
     raw: Vec<RawNoFly>,

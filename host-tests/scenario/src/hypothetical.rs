@@ -119,7 +119,7 @@ pub struct Fit {
     pub x_m: f64,
     /// Distance y_H of the hypothetical interferer from the line Tx-Rx, m, >= 0.
     pub y_m: f64,
-    /// Best power of an interferer at this position, and the remaining error.
+    /// Best power of an interferer at (`x_m`, `y_m`), and the error that remains.
     pub best_power: BestPower,
 }
 

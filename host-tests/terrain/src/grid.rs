@@ -462,7 +462,6 @@ fn srtm_corner(name: &str) -> Option<[f64; 2]> {
     Some([lon, lat])
 }
 
-/// Reads a tile of terrain heights from a GeoTIFF file.
 fn geotiff(path: &Path) -> Result<Tile, String> {
     let said = |error: tiff::TiffError| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;

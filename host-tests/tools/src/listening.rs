@@ -231,7 +231,7 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
 /// Time from the start of a run, s, after which its SIRs count for the mean.
 const BEGUN_S: u32 = 60;
 
-/// Mean fractions of the best possible SIR at the same time, one for each experiment.
+/// Means of SIR / best possible SIR at each moment, one mean for each experiment.
 ///
 /// The interferer moves. The first minute of a run does not count.
 #[derive(Clone, Debug, Default)]

@@ -816,7 +816,7 @@ struct InFlight {
     own: Option<Scenario>,
     flown: Flown,
     flight: Option<Flight>,
-    /// Reason why the relays cannot fly to these positions; `None` if they can.
+    /// Reason why the relays cannot fly to the positions that they agree on; `None` if they can.
     problem: Option<String>,
 }
 

@@ -33,14 +33,14 @@ struct AgreementShare {
     tenth_linear: f64,
 }
 
-/// Table row: mean SIR as a fraction of the best possible SIR, for one speed of the interferer.
+/// Table row: mean of SIR / best possible SIR, for one speed of the interferer.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct Tracked {
     relays: u16,
     speed_mps: f64,
-    /// Mean fraction of the best possible SIR at the same time, if the chain follows the interferer.
+    /// Mean of SIR / best possible SIR at each moment, if the chain follows the interferer.
     followed_linear: f64,
-    /// Mean fraction of the best possible SIR at the same time, if the chain does not move.
+    /// Mean of SIR / best possible SIR at each moment, if the chain does not move.
     ///
     /// It keeps the positions that were best after the first minute.
     stayed_linear: f64,

@@ -263,7 +263,7 @@ pub(super) fn range(area: &NoFly) -> String {
     format!("{} ({low} to {high} m)", area.key)
 }
 
-/// Returns the reason why relays cannot be at these positions; `None` if they can.
+/// Returns the reason why relays cannot be at the positions `chain`; `None` if they can.
 ///
 /// If `is_free`, relays choose their altitudes in flight, except relays with an altitude in the scenario. With
 /// `allow_crossing`, a path between neighbours through a no-fly area is no reason.

@@ -255,7 +255,6 @@ pub struct WayBack {
     /// Receiver of the worst hop in the direction from Rx to Tx: 0 for Tx, otherwise the relay's index.
     #[serde(skip)]
     hop: usize,
-    /// Number of relays in the planned chain.
     #[serde(skip)]
     relays: u16,
 }

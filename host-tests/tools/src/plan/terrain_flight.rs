@@ -178,7 +178,7 @@ pub struct FlownRelay {
     pub room_m: Option<[f64; 2]>,
 }
 
-/// Chain after the loss of one relay, when the other relays have closed the gap, over the terrain.
+/// Chain over the terrain after the loss of one relay, when the other relays have closed the gap.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Without {
     /// Number of the lost relay.
@@ -196,7 +196,7 @@ pub struct Without {
 /// Simulated flight: the positions that the relays choose, and the terrain below them.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Flight {
-    /// SIR of the worst hop with terrain at these positions, dB.
+    /// SIR of the worst hop in the flight with terrain, dB.
     pub terrain_sir_db: f64,
     /// SIR of the plan for the terrain minus the SIR of the flight, dB; absent without such a plan.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -244,7 +244,7 @@ const LINES: u8 = 24;
 /// Number of the best lines of constant y near which the search is refined.
 const FOLLOWED: usize = 3;
 
-/// Number of golden-section steps in y near each of these lines.
+/// Number of golden-section steps in y near each of the best lines of constant y.
 const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;

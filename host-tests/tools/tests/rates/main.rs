@@ -27,7 +27,6 @@ use judge::{Chain, Model};
 /// Relative tolerance of the SIR in requests to the planner.
 const TOLERANCE: f64 = 1e-5;
 
-/// Bandwidth of the data link in the tests, Hz.
 const BANDWIDTH_HZ: f64 = 1e6;
 
 /// Largest number of relays that the independent computation tries.
