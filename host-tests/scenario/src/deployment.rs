@@ -127,7 +127,7 @@ pub struct Ground {
     pub web_password: Option<PathBuf>,
     /// PMTiles archive with pictures of a map for the ground station's web page.
     pub tiles: Option<PathBuf>,
-    /// True to write log lines as JSON.
+    /// True for log lines in JSON.
     pub json: Option<bool>,
     /// Log file of the ground station, in place of its standard output.
     pub log_file: Option<PathBuf>,

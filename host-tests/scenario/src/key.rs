@@ -7,7 +7,7 @@ use std::path::Path;
 /// Reads the secret key in `file`. `option` is the command-line option that named the file, for error messages.
 ///
 /// # Errors
-/// A line with the option, the file and the problem, such as a file that other users can read; never the file's
+/// A text with the option, the file and the problem, such as a file that other users can read; never the file's
 /// content.
 pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     parse(&read(option, file)?).map_err(|error| format!("{option} {}: {error}", file.display()))
@@ -16,7 +16,7 @@ pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
 /// Reads a password from the first line of `file`. `option` is the command-line option that named the file.
 ///
 /// # Errors
-/// A line with the option, the file and the problem, as for a key; never the file's content.
+/// A text with the option, the file and the problem, as for a key; never the file's content.
 pub fn load_password(option: &str, file: &Path) -> Result<String, String> {
     let text = read(option, file)?;
     let password = text.lines().next().unwrap_or_default().trim();

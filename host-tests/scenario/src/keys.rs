@@ -25,7 +25,7 @@ pub(super) enum Rule {
     /// Text "los" (line of sight) or "nlos" (obstructed), or a number within this range.
     LinkOrNumber(Range),
     Flag,
-    /// One number within this range, or a list of two: the least and the greatest.
+    /// A number within this range, or a list of two: the least and the greatest.
     NumberOrTwo(Range),
     /// List with one number for each of these ranges.
     Numbers(&'static [Range]),

@@ -31,12 +31,12 @@ use crate::number::factor;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Access {
-    /// One frequency. Each of the N + 1 hops has one of N + 1 equal time slots.
+    /// A single frequency for all hops. Each of the N + 1 hops has one of N + 1 equal time slots.
     #[default]
     Slots,
     /// A frequency for each hop. All hops send at the same time.
     Channels,
-    /// One frequency. Each hop's time slot is as long as the hop needs for the same amount of data.
+    /// A single frequency for all hops. Each hop's time slot is as long as the hop needs for the same amount of data.
     Fitted,
 }
 

@@ -135,7 +135,7 @@ impl Terrain {
     /// Reads the elevation model in `files`, at least one.
     ///
     /// # Errors
-    /// A line that names the file and the problem: an unreadable or unsupported file, or files of different grids.
+    /// A text that names the file and the problem: an unreadable or unsupported file, or files of different grids.
     pub fn load(files: &[impl AsRef<Path>]) -> Result<Self, String> {
         let tiles = files.iter().map(|file| Tile::load(file.as_ref()));
         let mut tiles = tiles.collect::<Result<Vec<_>, _>>()?;
@@ -177,7 +177,7 @@ impl Terrain {
     /// Returns the height of the ground at a point, m above the mean sea level.
     ///
     /// # Errors
-    /// A line that names the point and the file: no file covers the point, or the file has a hole there.
+    /// A text that names the point and the file: no file covers the point, or the file has a hole there.
     pub fn height_m(&self, lat_deg: f64, lon_deg: f64) -> Result<f64, String> {
         let at = self.cells(lat_deg, lon_deg);
         interpolated(at, |node| self.node_m(node, lat_deg, lon_deg))

@@ -32,7 +32,9 @@ const LEAST_STEPS: f64 = 16.0;
 /// Smallest distance between two points of a profile, m.
 const APART_M: f64 = 1e-3;
 
-/// Smallest height of a parabola's vertex above or below its ends, m. A lower vertex is no profile point.
+/// Smallest height difference between a parabola's vertex and its ends, m.
+///
+/// A vertex with a smaller difference is no profile point.
 const VERTEX_M: f64 = 1e-3;
 
 /// Side of a square in which column and row of the elevation model are taken as linear in x and y, m.
@@ -392,7 +394,7 @@ impl<'a> Ground<'a> {
     /// Returns the profile of the hop between two antennas.
     ///
     /// # Errors
-    /// A line that names a position: the elevation files do not cover it, or have no height there.
+    /// A text that names a position: the elevation files do not cover it, or have no height there.
     pub fn profile(&self, nodes: [Node; 2]) -> Result<Profile, String> {
         Ok(Profile {
             nodes,

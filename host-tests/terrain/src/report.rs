@@ -99,7 +99,7 @@ impl TerrainReport {
     /// Creates the report of a chain with relays at `places`.
     ///
     /// # Errors
-    /// A line that names the position: the elevation files do not cover it, or have no height there.
+    /// A text that names the position: the elevation files do not cover it, or have no height there.
     pub fn new(
         ground: &Ground<'_>,
         places: &[Placement],

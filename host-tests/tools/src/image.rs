@@ -201,7 +201,7 @@ pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
 
 const RECORD: u8 = 16;
 
-/// Returns the image as the text of an Intel HEX file, with 32-bit addresses. The error is a line for the user.
+/// Returns the image as the text of an Intel HEX file, with 32-bit addresses. The error is a text for the user.
 pub fn hex(pieces: &[Piece]) -> Result<String, String> {
     let mut records = Vec::new();
     let mut above = None;

@@ -31,7 +31,7 @@ struct Row {
     sir_by_step_linear: Option<f64>,
 }
 
-/// Lowest and highest altitude, m, at which the figure has points every 0.5 m.
+/// Lowest and highest altitude, m, of the part of the figure with a point every 0.5 m.
 const CLOSE_UP_M: (u32, u32) = (195, 230);
 
 /// Returns a table row for each pair of an interferer's offset and a common altitude, m.

@@ -245,7 +245,7 @@ impl<'a> Search<'a> {
     /// Returns the candidate positions of every relay on a grid of `columns` x by `levels` altitudes.
     ///
     /// # Errors
-    /// A line that names the position: the elevation files do not cover it, or have no height there.
+    /// A text that names the position: the elevation files do not cover it, or have no height there.
     pub fn grid(&self, columns: u32, levels: u32) -> Result<Vec<Vec<Candidate>>, String> {
         let relays = 0..self.scene.relays.len();
         let each = relays.map(|relay| {

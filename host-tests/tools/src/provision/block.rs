@@ -301,7 +301,7 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
 /// firmware's default. `name` is the name of the scenario, for errors.
 ///
 /// # Errors
-/// A text that names a key whose value no block can have, its value and the allowed one.
+/// A text with the key whose value no block can have, that value, and the allowed one.
 pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> Result<u32, String> {
     let refuse = |key: &str, value: u32, own: u32, why: &str| {
         format!(

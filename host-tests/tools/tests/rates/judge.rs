@@ -19,7 +19,7 @@ pub(crate) struct Chain {
     pub(crate) distance_m: f64,
     /// Common altitude of the relays, m.
     pub(crate) altitude_m: f64,
-    /// Least distance between neighbouring relays along the line, m.
+    /// Least distance between neighbouring relays along x, m.
     pub(crate) apart_m: f64,
     /// Transmit powers of Tx, of the relays in order, and of Rx, W.
     pub(crate) powers_w: Vec<f64>,
