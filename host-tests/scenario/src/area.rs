@@ -208,7 +208,7 @@ impl NoFly {
         }
         let altitude_m = altitude_m.clamp(*lowest, *highest);
         let sides = [y_m - around_m, y_m + around_m];
-        // x at which the strip between both sides enters or leaves the area.
+        // Values of x at which the strip `around_m` left and right of the position enters or leaves the area.
         let mut turns = Vec::new();
         for [a, b] in edges(&self.corners) {
             turns.push(a[0]);
@@ -279,7 +279,7 @@ fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
 
 /// Returns twice the signed area of the triangle a, b, c.
 ///
-/// The sign is that of the side of a-b that c is on.
+/// Points c on opposite sides of the line a-b give opposite signs.
 fn turn([a, b]: [[f64; 2]; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }

@@ -133,16 +133,16 @@ const NEAR: f64 = 0.5;
 /// Reading of the paper's "average gain": the quantity that is averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub enum Reading {
-    /// Gain in linear SIR at each altitude, averaged over the altitudes.
+    /// Mean over the altitudes of the gain in linear SIR.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Gain in linear SIR after the SIRs are averaged over the altitudes.
+    /// Gain of the mean linear SIR over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
-    /// Gain after the SIRs in dB are averaged over the altitudes.
+    /// Gain of the mean SIR, where the SIRs are averaged in dB over the altitudes.
     #[serde(rename = "gain of mean dB")]
     Decibels,
-    /// Gain after log2(1 + SIR) is averaged over the altitudes.
+    /// Gain of the mean of log2(1 + SIR) over the altitudes.
     #[serde(rename = "gain of mean log2(1 + SIR)")]
     Rates,
 }

@@ -151,7 +151,7 @@ pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
     sirs.into_iter().reduce(f64::min).unwrap_or(0.0)
 }
 
-/// Result of a simulated chain with final positions.
+/// Result of a simulated chain after its positions have become final.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
     /// Positions of the relays in order from Tx to Rx.

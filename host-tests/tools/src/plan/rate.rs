@@ -256,7 +256,7 @@ const MOST_PROVEN: u16 = MOST_FAST;
 
 /// Returns true if it is proven that no number of relays up to `tried_uavs` carries more than `best`.
 ///
-/// For both directions, in equal slots or with a frequency for each hop.
+/// The data is for both directions, in equal slots or with a frequency for each hop.
 fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
     let more_bps = best.best_rate_bps * (1.0 + 2.0 * tolerance);
     best.tried_uavs <= MOST_PROVEN

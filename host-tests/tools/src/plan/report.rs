@@ -58,10 +58,14 @@ pub struct HypotheticalReport {
 /// Data rates of a planned chain, and of other numbers of relays.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
-    /// Data rate of the chain, bit/s; in a plan for both directions also back. Absent without a plan.
+    /// Data rate of the chain, bit/s; absent without a plan.
+    ///
+    /// A plan for both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<Rate>,
-    /// Data rate of the worst hop during its time slot, bit/s; in a plan for both directions also back.
+    /// Data rate of the worst hop during its time slot, bit/s.
+    ///
+    /// A plan for both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<Rate>,
     /// Number of time slots that the hops share.

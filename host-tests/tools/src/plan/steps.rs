@@ -360,7 +360,7 @@ struct Backward {
     farthest: Vec<Vec<f64>>,
     /// x of the useful grid points, m.
     ///
-    /// A useful point receives the next node from a larger x than some grid point that is farther from Tx.
+    /// At some rate step, a useful point can receive a more distant node than a grid point with a larger x can.
     useful: Vec<f64>,
 }
 

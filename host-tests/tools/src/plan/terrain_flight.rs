@@ -374,7 +374,8 @@ impl fmt::Display for Flight {
 
 /// Cuts `room` to the part around `place` that is outside of all no-fly areas.
 ///
-/// The position error counts. Returns the reason if the relay is inside a no-fly area, and so has no room.
+/// The areas are enlarged by the position error `error_m`, m. Returns the reason if the relay is inside an area, and so
+/// has no room.
 fn cut(
     room: &mut Option<[f64; 2]>,
     place: &Placement,

@@ -27,7 +27,7 @@ const WRITABLE: [&str; 2] = ["/var/lib/uav-relay", "/run/uav-relay"];
 /// Largest MAVLink system number of a drone. Ground stations have the next numbers.
 const MAX_SYSTEM: u16 = 250;
 
-/// Largest lateral distance of a take-off from the flight, m.
+/// Largest lateral distance of a take-off from the chain, m.
 pub const ASIDE_M: f64 = 50.0;
 
 /// Largest radius and altitude of ArduCopter's fences, m.
@@ -63,8 +63,8 @@ pub struct Bundle<'a> {
     pub simulated: Option<&'a Flight>,
     /// Lowest and highest ground, m above the sea; `None` without terrain.
     ///
-    /// It is the ground up to [`ASIDE_M`] beside the flight. The highest ground is raised by the least height above the
-    /// ground.
+    /// It is the ground up to [`ASIDE_M`] beside the chain. The highest value includes the smallest permitted height of
+    /// relays above the ground.
     pub ground_m: Option<[f64; 2]>,
     /// Line from Tx to Rx.
     pub line: &'a Line,

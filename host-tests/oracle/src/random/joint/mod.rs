@@ -165,7 +165,7 @@ pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     drawn
 }
 
-/// Changes a scenario so that its relays differ, by the module's last table.
+/// Returns the scenario with relays that differ, as in the module's last table.
 ///
 /// Some relays get their own power. For some relays the lateral position and altitude are fixed.
 #[must_use]
