@@ -5,8 +5,9 @@ use serde_json::Value;
 
 use crate::reference::{Link, Relay};
 
-/// Optimum (linear SIR) of the default scenario for each number of relays. An independent program has computed the
-/// values, to nine digits.
+/// Optimum (linear SIR) of the default scenario, for each number of relays.
+///
+/// An independent program has computed it to nine digits.
 pub const OPTIMA: [(u16, f64); 12] = [
     (1, 1.490_121_51),
     (2, 1.616_583_02),
@@ -22,7 +23,7 @@ pub const OPTIMA: [(u16, f64); 12] = [
     (100, 40.441_345_0),
 ];
 
-/// Scenario of a reference case, in SI units. Each field is named like its key in `data/reference.json`.
+/// Scenario of a reference case, in SI units. Fields are named like the keys in `data/reference.json`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Params {
     /// Transmit power of Tx, watts.
@@ -31,10 +32,10 @@ pub struct Params {
     pub p_u: f64,
     /// Transmit power of the interferer, watts.
     pub p_msi: f64,
-    /// Interferer's coordinate along Tx-Rx, metres.
+    /// Position x of the interferer: distance from Tx toward Rx, metres.
     #[serde(rename = "X")]
     pub x: f64,
-    /// Interferer's lateral offset from the line Tx-Rx, metres.
+    /// Position y of the interferer: lateral offset from the line Tx-Rx, metres.
     #[serde(rename = "Y")]
     pub y: f64,
     /// Distance from Tx to Rx, metres.
@@ -56,7 +57,7 @@ pub struct Params {
     pub eta: f64,
 }
 
-/// Reference case, computed by an independent program: a function, its arguments and its result.
+/// Reference case of an independent program: a function, its arguments and its result.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Case {
     /// Name of the evaluated function.
@@ -66,9 +67,9 @@ pub struct Case {
     pub params: Params,
     /// Arguments of the function, by name.
     pub args: Value,
-    /// Result of the function: one value, or an object of named values.
+    /// Result: one value, or an object of named values.
     pub out: Value,
-    /// Relative accuracy of the result, as a tolerance for comparisons.
+    /// Relative tolerance for a comparison with the result.
     pub rtol: f64,
     /// Name of the case, unique in the file.
     pub id: String,
@@ -99,7 +100,7 @@ pub fn of(function: &str) -> Result<Vec<Case>, serde_json::Error> {
 }
 
 impl Case {
-    /// Returns the scenario of this case as a link with `n` relays. All relays have the same altitude and power.
+    /// Returns the scenario of this case as a link with `n` equal relays.
     pub fn link(&self, n: usize) -> Link {
         let p = &self.params;
         Link {
@@ -123,7 +124,7 @@ impl Case {
         }
     }
 
-    /// Returns the number of relays, the argument `N` of this case, if the case has this argument. Otherwise `None`.
+    /// Returns the argument `N` of this case, the number of relays; `None` if the case has no `N`.
     pub fn relays(&self) -> Option<usize> {
         self.args.get("N")?.as_u64()?.try_into().ok()
     }
@@ -159,7 +160,7 @@ impl Case {
     }
 }
 
-/// Reads a JSON number, or a word such as "inf" for a value that JSON cannot represent.
+/// Reads a JSON number, or a word for a value that JSON lacks, such as "inf".
 fn number(value: &Value) -> Option<f64> {
     match value.as_str() {
         Some("nan") => Some(f64::NAN),

@@ -1,7 +1,7 @@
 //! Test oracles for placements. Independent f64 optimisers, recorded optima, values of an independent program, random scenarios.
 //!
-//! The optimisers share no formula with `uav-relay`; the scenarios are weighted toward where formulas break. No product depends
-//! on this crate.
+//! The optimisers share no formula with `uav-relay`. The random scenarios are often close to the values at which
+//! formulas break. No product depends on this crate.
 //!
 //! | module | content |
 //! | --- | --- |

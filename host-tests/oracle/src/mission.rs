@@ -11,9 +11,9 @@ use crate::reference::{Link, Relay};
 
 /// Converts a reference link to a mission, and to the profiles of relays that differ from the first.
 ///
-/// The profile (altitude and power) of the first relay becomes the common profile of the mission. Each returned profile
-/// has the index of its relay, from 1. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay
-/// would reject a number.
+/// A profile is an altitude and a power. The mission has the first relay's profile. Each other profile has the index of
+/// its relay, from 1. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay would reject a
+/// number.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     let channel = Channel::new(
@@ -54,9 +54,9 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
     Some((Mission::try_new(config).ok()?, own.collect()))
 }
 
-/// Converts a reference link to the planner's description of a chain. `None` if the link has no relays.
+/// Converts a reference link to the planner's scene; `None` if the link has no relays.
 ///
-/// The planner's range of altitudes contains only one altitude, that of the first relay.
+/// The range of altitudes in the scene is the altitude of the first relay alone.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
     let relay = |station: &Relay| scene::Relay {
@@ -86,9 +86,9 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
     })
 }
 
-/// Converts a link with identical relays, and interference known only along the line, to a mission.
+/// Converts a link of equal relays, with interference known only along the line Tx-Rx, to a mission.
 ///
-/// `min_separation_m` is the mission's minimum distance of two relays, m. `None` if a relay would reject a number.
+/// `min_separation_m` is the minimum distance between two relays, m. `None` if a relay would reject a number.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link
@@ -99,7 +99,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
             upsilon_per_w: narrow(upsilon),
         })
         .collect();
-    // The ground link is not used here: any factor above both others lets eta be a mixture.
+    // The ground link is not used here. With a factor above both others, eta can be a mixture.
     let mu_nlos = 2.0 * link.eta.max(link.mu_los);
     let weight = (mu_nlos - link.eta) / (mu_nlos - link.mu_los);
     let common = Profile {
@@ -131,12 +131,14 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
     Mission::try_new(config).ok()
 }
 
-/// Carrier frequency at which the free-space factor (4 pi f / c)^2 is 1, Hz. Excess losses then equal path-loss
-/// factors.
+/// Carrier frequency, Hz, at which the free-space factor (4 pi f / c)^2 is 1.
+///
+/// An excess loss then equals the path-loss factor.
 const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 
-/// Rounds every number of `link` to f32, as in a relay's mission. A comparison then tests only a relay's arithmetic,
-/// not the rounding of its inputs.
+/// Rounds every number of `link` to f32, as in a relay's mission.
+///
+/// A comparison then tests a relay's arithmetic, and not the rounding of its inputs.
 pub fn as_relays_know_it(link: &Link) -> Link {
     let round = |value: f64| f64::from(narrow(value));
     Link {

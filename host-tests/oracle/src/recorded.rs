@@ -1,10 +1,12 @@
-//! Recorded optima of the joint problem. Positions, altitudes and sides that maximise the worst hop's SIR.
+//! Recorded optima of the joint problem: positions and altitudes that maximise the worst hop's SIR.
 //!
-//! `data/optima.jsonl` has one scene per line after its head: the parameters, the best SIR known, and the positions that reach it.
-//! The problem has many local optima and no proof of the best one, so the optima are those of a search with many starts, which is
-//! no longer part of the project; the file's head names it.
+//! `data/optima.jsonl` has one problem per line, after a first line about the file. Each line has the parameters, the
+//! best known SIR, and the positions that reach it. The problem has many local optima, and the best one is not proven.
+//! The optima are the results of a search with many starts. That search is no longer part of the project; the first
+//! line of the file names it.
 //!
-//! The tests of the crate's solvers look up the scenes that they draw ([`optimum`]). The test `recorded` checks the file itself.
+//! The tests of the crate's solvers look up their problems here ([`optimum`]). The test `recorded` checks the file
+//! itself.
 
 use std::io::{Error, Result};
 use std::sync::LazyLock;
@@ -35,13 +37,14 @@ pub struct Optimum {
     pub places: Vec<Place>,
 }
 
-/// Recorded placement problem with its best known chain.
+/// Recorded problem with its best known chain.
 #[derive(Debug, Clone)]
 pub struct Record {
     /// Name of the test that draws this problem, with its random stream, such as `joint_method own 7`.
     pub set: String,
-    /// Link, and the corridor in which its relays choose positions. In the link the relays are at the lowest
-    /// altitude.
+    /// Link, and the corridor in which its relays choose positions.
+    ///
+    /// In the link all relays are at the lowest altitude.
     pub scene: Scenario,
     /// Best known chain; `None` if no chain has a positive SIR and keeps the minimum separation.
     pub best: Option<Optimum>,
@@ -57,7 +60,7 @@ struct Row {
     #[serde(default)]
     apart_m: f64,
     tx_w: f64,
-    /// Transmit power of every relay, W; a single number if all relays have the same power.
+    /// Transmit power of each relay, W; one number if all relays have the same power.
     relay_w: Vec<f64>,
     /// Interferer's power, W, and its position x and y, m.
     interferer: [f64; 3],
@@ -113,7 +116,7 @@ impl Row {
             altitude_m: single(altitude_m),
         };
         let held: Vec<FixedCrossSection> = self.held.iter().map(hold).collect();
-        // Decimals may be rounded to beyond a wall.
+        // A rounded decimal may be just outside of the corridor.
         let place = |(relay, &[x_m, y_m, altitude_m]): (usize, &[f64; 3])| {
             let room = FixedCrossSection::corridor_of(&held, relay, corridor);
             Place {
@@ -139,8 +142,7 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a placement problem as f32 numbers. The problem is looked up in the recorded file by these
-/// numbers.
+/// Returns all parameters of a problem as f32 numbers. They identify the problem in the file.
 ///
 /// The altitudes of `link` are left out, because relays choose their altitudes in these problems.
 fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {
@@ -173,10 +175,10 @@ fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> 
         .collect()
 }
 
-/// Returns every recorded placement problem.
+/// Returns every recorded problem.
 ///
 /// # Errors
-/// If a line of the file is not such a problem.
+/// If a line of the file is not a problem.
 pub fn all() -> Result<&'static [Record]> {
     let all = ALL.as_ref().map(Vec::as_slice);
     all.map_err(|error| Error::other(error.clone()))
@@ -187,7 +189,7 @@ pub fn all() -> Result<&'static [Record]> {
 /// `None` if no chain has a positive SIR and keeps the minimum separation.
 ///
 /// # Errors
-/// If the problem is not recorded. So the `SEED` and `COUNT` of a test must select recorded problems.
+/// If the problem is not recorded: `SEED` and `COUNT` of a test must select recorded problems.
 pub fn optimum(
     link: &Link,
     corridor: Corridor,

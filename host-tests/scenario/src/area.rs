@@ -3,14 +3,14 @@
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// Area on the ground with a boundary that does not cross itself.
+/// Area on the ground. Its boundary does not cross itself.
 ///
-/// Points are [x, y], m: the distance from Tx along the line to Rx, and the offset to the right.
+/// Points are [x, y], m. x is the distance from Tx toward Rx, and y the offset to the right as seen from Tx.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Area {
     /// Circle around a point.
     Circle {
-        /// Middle of the circle.
+        /// Centre of the circle, [x, y], m.
         centre: [f64; 2],
         /// Radius, m, > 0.
         radius_m: f64,
@@ -19,10 +19,10 @@ pub enum Area {
     Polygon(Vec<[f64; 2]>),
 }
 
-/// Area in which an interferer can be anywhere, and the least power of the interferer.
+/// Area of an interferer whose exact position and power are unknown.
 ///
-/// The corresponding entry of [`Interference`](crate::Interference) is an interferer with the greatest power, in the
-/// middle of the area.
+/// The entry in [`Interference`](crate::Interference) has the interferer's greatest power, and the middle of the area
+/// as its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceArea {
     /// Possible positions of the interferer. Neither Tx nor Rx is inside.
@@ -31,21 +31,21 @@ pub struct SourceArea {
     pub least_w: f64,
 }
 
-/// No-fly area: relays must not fly in it between two altitudes.
+/// No-fly area: relays must not fly in it between its lowest and its highest altitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoFly {
-    /// Key of the area in the file, for messages, such as `no_fly[0]`.
+    /// Name of the area in error messages, such as `no_fly[0]`.
     pub key: String,
-    /// Corners of the boundary. A circle of the file is replaced by a polygon that contains it.
+    /// Corners of the boundary, [x, y], m. A circle in the file is replaced by a polygon around it.
     pub corners: Vec<[f64; 2]>,
-    /// Lowest and highest altitude of the area, m, measured like `geometry.altitude_m`.
+    /// Lowest and highest altitude of the no-fly area, m, measured like `geometry.altitude_m`.
     pub altitudes_m: RangeInclusive<f64>,
 }
 
-/// Minimum surface of a polygon, m2.
+/// Smallest accepted area of a polygon, m2.
 const LEAST_M2: f64 = 1.0;
 
-/// Number of corners of the polygon around a circle.
+/// Number of corners of the polygon that replaces a circle.
 const CORNERS: u32 = 64;
 
 impl Area {
@@ -84,14 +84,15 @@ impl Area {
         distance_m(self.nearest(at), at)
     }
 
-    /// Returns the centre of gravity of the area. If this centre is outside, returns the point of the area nearest to
-    /// it.
+    /// Returns the centre of gravity of the area, or the point of the area nearest to it.
+    ///
+    /// The centre of gravity can be outside of an area that is not convex.
     pub fn centre(&self) -> [f64; 2] {
         let corners = match self {
             Self::Circle { centre, .. } => return *centre,
             Self::Polygon(corners) => corners,
         };
-        // Relative to a corner, so that large coordinates do not cancel.
+        // Coordinates relative to a corner: large coordinates would lose digits.
         let [x, y] = corners.first().copied().unwrap_or_default();
         let (mut area, mut sum) = (0.0, [0.0; 2]);
         for [a, b] in edges(corners) {
@@ -106,7 +107,7 @@ impl Area {
         self.nearest([x + sum[0] / (3.0 * area), y + sum[1] / (3.0 * area)])
     }
 
-    /// Returns the least and the greatest corner of the smallest rectangle along x and y around the area.
+    /// Returns the smallest x and y of the area, and its largest x and y, m.
     pub fn bounds(&self) -> [[f64; 2]; 2] {
         match self {
             Self::Circle {
@@ -125,7 +126,7 @@ impl Area {
         }
     }
 
-    /// Returns the corners of a polygon that contains the area. For a circle the polygon has 64 corners.
+    /// Returns the corners of a polygon that contains the area. A circle becomes a polygon of 64 corners.
     pub fn corners(&self) -> Vec<[f64; 2]> {
         match self {
             Self::Circle { centre, radius_m } => {
@@ -140,10 +141,10 @@ impl Area {
         }
     }
 
-    /// Creates the polygon with these corners, in order. The last corner may repeat the first corner.
+    /// Creates a polygon from its corners in order. The last corner may repeat the first corner.
     ///
     /// # Errors
-    /// A text that states the fault: too few corners, no surface, or edges that cross or touch.
+    /// A text with the fault: fewer than 3 different corners, an area below 1 m2, or edges that cross or touch.
     pub fn polygon(mut corners: Vec<[f64; 2]>) -> Result<Self, String> {
         if corners.len() > 1 && corners.first() == corners.last() {
             corners.pop();
@@ -180,10 +181,9 @@ impl Area {
 }
 
 impl NoFly {
-    /// Returns how far a relay is inside the area, m; `None` if the relay is outside.
+    /// Returns how deep a relay is inside the no-fly area, m; `None` if it is outside.
     ///
-    /// The result is the smallest of three distances: to the boundary, to the lowest altitude and to the highest
-    /// altitude.
+    /// The depth is the smallest distance to the boundary, the lowest altitude and the highest altitude.
     pub fn depth_m(&self, at: [f64; 2], altitude_m: f64) -> Option<f64> {
         if !(self.altitudes_m.contains(&altitude_m) && is_inside(&self.corners, at)) {
             return None;
@@ -197,9 +197,9 @@ impl NoFly {
         Some(beside.chain(heights).fold(f64::INFINITY, f64::min))
     }
 
-    /// Returns the intervals of x, m, in which a relay is in the area or near it.
+    /// Returns the intervals of x, m, in which a relay is inside the no-fly area or close to it.
     ///
-    /// The relay is at `y_m` and `altitude_m`, and may be off by `around_m` in x, y and altitude.
+    /// The relay flies at `y_m` and `altitude_m`. Its position may be wrong by up to `around_m` in x, y and altitude.
     pub fn intervals_m(&self, y_m: f64, altitude_m: f64, around_m: f64) -> Vec<[f64; 2]> {
         let around_m = around_m.max(1e-6);
         let [lowest, highest] = [self.altitudes_m.start(), self.altitudes_m.end()];
@@ -208,7 +208,7 @@ impl NoFly {
         }
         let altitude_m = altitude_m.clamp(*lowest, *highest);
         let sides = [y_m - around_m, y_m + around_m];
-        // Places at which the strip enters or leaves the area.
+        // Values of x at which the strip `around_m` left and right of the position enters or leaves the area.
         let mut turns = Vec::new();
         for [a, b] in edges(&self.corners) {
             turns.push(a[0]);
@@ -230,7 +230,9 @@ impl NoFly {
             .collect()
     }
 
-    /// Returns the length of the straight way inside the area, seen from above, m. Each end is [x, y, altitude].
+    /// Returns the horizontal length of a straight path inside the area, m.
+    ///
+    /// The path has two ends, each [x, y, altitude].
     pub fn crossing_m(&self, [from, to]: [[f64; 3]; 2]) -> f64 {
         let climb = to[2] - from[2];
         let mut turns = vec![0.0, 1.0];
@@ -275,7 +277,9 @@ fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// Returns twice the area of the triangle a, b, c; negative if c is on the other side of a-b.
+/// Returns twice the signed area of the triangle a, b, c.
+///
+/// Points c on opposite sides of the line a-b give opposite signs.
 fn turn([a, b]: [[f64; 2]; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
@@ -294,7 +298,9 @@ fn cross(one: [[f64; 2]; 2], other: [[f64; 2]; 2]) -> bool {
     sides(one, other) && sides(other, one) && overlap(0) && overlap(1)
 }
 
-/// Returns true if the second edge goes back along the first edge. The second edge begins where the first edge ends.
+/// Returns true if the second edge runs back along the first edge.
+///
+/// The second edge begins where the first edge ends.
 fn is_spike(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> bool {
     let [[a, b], [_, c]] = [first, second];
     let back = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);

@@ -1,4 +1,6 @@
-//! Checks a file against the table of keys: shape, known and required keys, types, ranges.
+//! Checks a scenario file against the table of keys.
+//!
+//! The checks are for the form of the file, unknown and missing keys, types and ranges.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -50,7 +52,7 @@ impl Check<'_> {
         if let Some((name, value)) = table.iter().find(|(name, _)| !is_known(name)) {
             let meant = nearest(name, keys.clone());
             let allowed = format!("the keys {}{meant}", names(keys));
-            // The name comes from the file, and a quoted key may be as long as the file.
+            // The name is from the file, and may be as long as the file.
             let path = join(path, &cut(name));
             return Err(mistake(
                 self.file,
@@ -68,7 +70,7 @@ impl Check<'_> {
                     self.value(&path, value, &key.rule)?;
                 }
                 None if !key.is_missed(table) => {}
-                // An absent table is treated as an empty one, so its first required key is reported as missing.
+                // A missing table counts as an empty table, so that its first required key is reported.
                 None => match key.rule {
                     Rule::Table(inner) => self.table(&path, &Table::new(), inner)?,
                     ref rule => {
@@ -92,8 +94,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` if its table also has a key that must not be given together with it. An example of such a pair is
-    /// `power_w` and `power_dbm`.
+    /// Rejects `key` if its table also has a key that excludes it, such as `power_w` and `power_dbm`.
     fn check_exclusive(
         &self,
         path: &str,
@@ -116,7 +117,7 @@ impl Check<'_> {
         ))
     }
 
-    /// Checks that an entry of a list is a number within `range`.
+    /// Checks that `value`, an entry of a list, is a number within `range`.
     fn number(&self, path: &str, value: &Value, range: &Range) -> Result<(), ScenarioError> {
         let problem = match as_number(value) {
             Some(number) if range.holds(number) => return Ok(()),
@@ -226,7 +227,7 @@ impl Check<'_> {
             (Rule::Table(_), Value::Array(list)) if list.iter().any(Value::is_table) => {
                 fail(Problem::NoTable)
             }
-            // serde would accept a list for a table, field by field, which is never intended.
+            // serde would accept a list in place of a table, with the list's entries as fields.
             _ => fail(Problem::WrongType),
         }
     }
@@ -235,7 +236,7 @@ impl Check<'_> {
 /// Minimum similarity for an error message to suggest a known key: Jaro-Winkler, 0 to 1.
 const ALIKE: f64 = 0.8;
 
-/// Returns "; did you mean KEY?" with the known key most similar to `name`. Empty if no known key is similar.
+/// Returns "; did you mean KEY?" with the most similar known key; empty if no key is similar.
 fn nearest(name: &str, keys: impl IntoIterator<Item = &'static Key>) -> String {
     let alike = keys
         .into_iter()
@@ -262,9 +263,9 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Creates the error for a table that [`table`] accepts, but serde cannot convert to its Rust type.
+/// Creates the error for a table that [`table`] accepts, but serde rejects.
 ///
-/// Such an error is a bug of this crate: the table of allowed keys and the Rust types differ.
+/// This error is a bug of the crate: the table of keys and the Rust types differ.
 pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),
@@ -275,8 +276,9 @@ pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> Scenario
     }
 }
 
-/// Maximum size of a scenario file, bytes. It is far more than 1000 relays and as many interferers need. The limit ends
-/// the reading of endless files such as `/dev/zero`.
+/// Largest size of a scenario file, bytes.
+///
+/// It stops the reading of endless files such as `/dev/zero`.
 const LONGEST: u64 = 1 << 20;
 
 pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {

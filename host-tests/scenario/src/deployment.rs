@@ -1,6 +1,7 @@
-//! Settings of a chain's programs beside the scenario: network, ports and files.
+//! Settings of the programs in a chain, apart from the scenario: network, ports and files.
 //!
-//! They are sections `[network]`, `[companion]` and `[ground]` of the scenario file. Tools that do not fly only check them.
+//! They are the sections `[network]`, `[companion]` and `[ground]` of the scenario file. Tools that do not fly only
+//! check them.
 
 use std::path::PathBuf;
 
@@ -14,11 +15,12 @@ use crate::error::{Problem, ScenarioError};
 /// Default network number of all tools. Relays ignore frames with another network number.
 pub const NETWORK: u16 = 1;
 
-/// Relative tolerance of the target SIR that companions compute. No option or key changes it.
+/// Relative tolerance of the target SIR on companion computers. It cannot be set.
 pub const COMPANION_TOLERANCE: f64 = 1e-4;
 
-/// Settings of the programs in a scenario file: `[network]`, `[companion]` and `[ground]`. If a value is `None`, the
-/// program uses its default.
+/// Settings of the programs: sections `[network]`, `[companion]` and `[ground]` of a scenario file.
+///
+/// If a value is `None`, the program uses its default.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Deployment {
@@ -44,9 +46,9 @@ pub struct Network {
     pub method: Option<String>,
     /// Data rate of the serial ports between relays, bit/s, 1200 to 4000000.
     pub baud: Option<u32>,
-    /// Time without a frame from a neighbour after which the relay requests a heartbeat, ms, 1 to 3600000.
+    /// Silence of a neighbour after which the relay requests a heartbeat, ms, 1 to 3600000.
     pub probe_after_ms: Option<u32>,
-    /// Time without a frame from a neighbour after which this neighbour counts as lost, ms, 1 to 3600000.
+    /// Silence of a neighbour after which it counts as lost, ms, 1 to 3600000.
     pub dead_after_ms: Option<u32>,
 }
 
@@ -55,7 +57,7 @@ pub struct Network {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Companion {
-    /// Index of the relay that this drone carries, 1 to 1000; 1 is next to the transmitter.
+    /// Index of this drone's relay, 1 to 1000; relay 1 is next to Tx.
     pub index: Option<u16>,
     /// Serial port of the link to the neighbour toward the transmitter.
     pub upstream: Option<PathBuf>,
@@ -63,11 +65,11 @@ pub struct Companion {
     pub downstream: Option<PathBuf>,
     /// Serial port of a radio channel that all relays share. It replaces `upstream` and `downstream`.
     pub shared: Option<PathBuf>,
-    /// File that stores the epoch, a start counter that prevents replays of frames from earlier starts.
+    /// File that stores the epoch: a start counter that protects against replayed frames.
     pub epoch_file: Option<PathBuf>,
     /// File that stores the newest mission that was uploaded to the relay.
     pub upload_file: Option<PathBuf>,
-    /// File that stores the relay's votes on the membership of the chain. It prevents a second vote after a reboot.
+    /// File that stores the relay's votes on the membership. It prevents a second vote after a reboot.
     pub view_file: Option<PathBuf>,
     /// Autopilot: a serial port, or a UDP address as parsed by [`Endpoint`](crate::endpoint::Endpoint).
     pub autopilot: Option<String>,
@@ -77,28 +79,27 @@ pub struct Companion {
     pub autopilot_key_file: Option<PathBuf>,
     /// Greatest speed of the drone, m/s, 0.1 to 20.
     pub speed_m_s: Option<f32>,
-    /// Reserve of the drone's remaining time of flight, s, 0 to 3600. If it is `None`, the relay never leaves the chain
-    /// by itself.
+    /// Flight time that the drone keeps as a reserve, s, 0 to 3600. `None`: the relay never leaves the chain by itself.
     pub reserve_s: Option<f32>,
-    /// Time of flight with a full battery, s, 1 to 21600.
+    /// Flight time with a full battery, s, 1 to 21600.
     pub flight_time_s: Option<f32>,
-    /// Speed of the return home, m/s, 0.1 to 20.
+    /// Speed of the drone during its return home, m/s, 0.1 to 20.
     pub return_speed_m_s: Option<f32>,
-    /// Mean speed of the descent to land, m/s, 0.1 to 20.
+    /// Mean speed of descent for landing, m/s, 0.1 to 20.
     pub descent_m_s: Option<f32>,
-    /// True if the relay waits outside of the chain until the leader calls it to replace another relay.
+    /// True if the relay is a spare: it waits outside of the chain until the leader calls it.
     pub spare: Option<bool>,
-    /// FIFO from which the companion reads the drone's own position. Another program writes it.
+    /// FIFO with the drone's position, which another program writes.
     pub positions: Option<PathBuf>,
-    /// Largest reported position error of a hovering drone, m, 0 to 1000.
+    /// Largest position error of a hovering drone, m, 0 to 1000.
     pub position_error_m: Option<f32>,
-    /// True to write log lines as JSON.
+    /// True for log lines in JSON.
     pub json: Option<bool>,
-    /// Log file of the companion, in place of its standard output.
+    /// Log file of the companion; `None` for standard output.
     pub log_file: Option<PathBuf>,
     /// Unix socket at which the companion reports its status and counters.
     pub status_socket: Option<PathBuf>,
-    /// File to which the traffic on the companion's ports is captured.
+    /// File that captures the traffic on the companion's ports.
     pub capture: Option<PathBuf>,
 }
 
@@ -126,13 +127,13 @@ pub struct Ground {
     pub web_password: Option<PathBuf>,
     /// PMTiles archive with pictures of a map for the ground station's web page.
     pub tiles: Option<PathBuf>,
-    /// True to write log lines as JSON.
+    /// True for log lines in JSON.
     pub json: Option<bool>,
     /// Log file of the ground station, in place of its standard output.
     pub log_file: Option<PathBuf>,
     /// Unix socket at which the ground station reports its status and counters.
     pub status_socket: Option<PathBuf>,
-    /// File to which the traffic on the ground station's port is captured.
+    /// File that captures the traffic on the ground station's port.
     pub capture: Option<PathBuf>,
 }
 

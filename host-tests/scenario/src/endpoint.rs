@@ -1,7 +1,7 @@
 //! UDP address of an autopilot, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`.
 //!
-//! The local port is the same at each start: a PX4 answers only the first address and port that it receives from until it
-//! restarts, so a program with a new local port at each start would get no answer after the first.
+//! The local port is the same at each start. Until a PX4 restarts, it answers only the first address and port that it
+//! received from. With a new local port, a restarted program would get no answer.
 
 use core::fmt;
 
@@ -9,7 +9,7 @@ const PREFIX: &str = "udp:";
 
 /// UDP ports at which PX4's simulation listens for a companion computer: one for each vehicle, 0 to 9.
 const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
-/// Local UDP port to which vehicle 0 of PX4's simulation sends. Each further vehicle sends to the next port.
+/// Local UDP port that vehicle 0 of PX4's simulation sends to. Each further vehicle sends to the next port.
 const PX4_SENDS_TO: u16 = 14_540;
 
 /// Difference between the companion's default local port and the autopilot's port. It applies only to autopilot ports

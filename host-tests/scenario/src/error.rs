@@ -6,7 +6,7 @@ use toml::Value;
 
 use crate::endpoint::EndpointError;
 
-/// Number of characters to which an error message shortens a quoted value.
+/// Largest number of characters of a quoted value in an error message.
 const QUOTED: usize = 60;
 
 /// A mistake in a scenario file; displayed as exactly one line.
@@ -48,7 +48,7 @@ pub enum Problem {
     Missing,
     /// Two keys that exclude each other are both given, such as a power in W and in dBm.
     SaidTwice,
-    /// A position in latitude and longitude is given without the table `[site]`, to which it relates.
+    /// A position in latitude and longitude is given, but the table `[site]` that it needs is missing.
     NoSite,
     /// The value of a key is a text outside the list of allowed texts.
     UnknownChoice,

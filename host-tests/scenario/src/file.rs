@@ -1,4 +1,4 @@
-//! Typed form of the file, and checks that involve several keys.
+//! Typed content of a scenario file, and the checks that compare several of its keys.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,9 +19,9 @@ use super::spec::{
     PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source, TerrainSpec,
 };
 
-/// Contents of a scenario file as serde reads them, before the keys are checked against each other.
+/// Content of a scenario file as serde reads it, before its keys are compared with each other.
 ///
-/// With `deny_unknown_fields`, parsing fails if the table of allowed keys has a key that this type lacks.
+/// Because of `deny_unknown_fields`, parsing fails if the table of allowed keys has a key that this type lacks.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFile {
@@ -63,8 +63,9 @@ struct RawNoFly {
     highest_m: Option<f64>,
 }
 
-/// Area as a file gives it: exactly one of these keys. Keys with `_deg` contain latitudes and longitudes, the others x
-/// and y in m.
+/// Area in a scenario file: exactly one of these keys is given.
+///
+/// Keys that end in `_deg` have latitudes and longitudes, degrees. The other keys have x and y, m.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawArea {
@@ -76,7 +77,7 @@ struct RawArea {
     circle_deg: Option<[f64; 3]>,
 }
 
-/// Power of an interferer, or its least and its greatest power.
+/// Power of an interferer: one value, or the least and the greatest value.
 #[derive(Deserialize, Clone, Copy)]
 #[serde(untagged)]
 enum RawPowers {
@@ -306,7 +307,9 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     })
 }
 
-/// Converts the `[terrain]` table of a file. Its elevation files are relative to the folder of the file.
+/// Converts the `[terrain]` table of a file.
+///
+/// Paths of elevation files are relative to the folder of `file`.
 fn terrain(file: &str, raw: &RawTerrain, has_site: bool) -> Result<TerrainSpec, ScenarioError> {
     if !has_site {
         let allowed = "a [site] with the geographic positions of Tx and Rx, or no [terrain]";
@@ -423,7 +426,7 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
     if nlos >= los {
         return Ok(spec);
     }
-    // Reports a key that the file contains.
+    // The error names a key that is in the file.
     let (key, value, allowed) = match raw.excess_loss_nlos_db {
         Some(_) => (
             "channel.excess_loss_nlos_db",
@@ -638,7 +641,7 @@ pub(super) fn line(
 fn line_on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
     let geoid_m = sites.geoid_m;
     let sites @ [tx, rx] = [&sites.tx, &sites.rx].map(|site| {
-        // The ranges have been checked.
+        // The check of the keys has accepted these ranges.
         Geodetic::from_degrees(site.lat_deg, site.lon_deg, site.amsl_m).unwrap_or_default()
     });
     let axis = Axis::try_new(tx, rx).map_err(|error| {
@@ -658,10 +661,10 @@ fn line_on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
     })
 }
 
-// Powers as in data sheets, in W or dBm and with antenna gains, and their form in the model.
+// Data sheets give powers in W or dBm, and antenna gains. The model uses EIRPs.
 //
-// The channel model has only a path loss: P / (mu d^2) is received of P. With antennas of gains `G_t` and `G_r` (Friis) it is
-// `P G_t G_r / (mu d^2)`. With the interferers' `P_i G_i` and the receiver's noise N, the SINR is
+// The channel model has only a path loss: of a sent power P, P / (mu d^2) is received. With antenna gains `G_t` and
+// `G_r` (Friis) it is `P G_t G_r / (mu d^2)`. With the interferers' `P_i G_i` and the receiver's noise N, the SINR is
 //
 // ```text
 // P G_t G_r / (mu d^2)                      P G_t / (mu d^2)
@@ -669,8 +672,8 @@ fn line_on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
 // sum P_i G_i G_r / (mu_i d_i^2) + N   sum P_i G_i / (mu_i d_i^2) + N / G_r
 // ```
 //
-// so a sender's gain is included in its power (its EIRP counts), and a receiver's gain, which signal and interference share,
-// divides its noise. Without noise it has no effect.
+// A sender's gain is therefore part of its power: the EIRP counts. A receiver's gain raises signal and interference
+// alike, so it only divides the noise. Without noise it has no effect.
 //
 // A mission has one N for all receivers. If the gains of the relays and of Rx differ, the lower one is used: exact for receivers
 // with that gain, and a lower bound on the SINR at the others.
@@ -705,7 +708,9 @@ pub(super) struct Powers {
     pub(super) rx_gain_dbi: f64,
 }
 
-/// Power of a sender as the file gives it: in W, in dBm, or as an EIRP, each with the name of its key.
+/// Power of a sender in a scenario file: in W, in dBm, or as an EIRP.
+///
+/// Each value has the name of its key.
 pub(super) struct GivenPower<'a> {
     /// Prefix of the keys' names in error messages: the table with a dot, such as `interferer[0].`
     pub(super) table: &'a str,
@@ -725,7 +730,7 @@ impl GivenPower<'_> {
             (_, _, said @ (_, Some(dbm))) => (said, watts(dbm)),
             _ => return Ok(None),
         };
-        // The ranges of the keys have the same limits, apart from rounding of powers of ten.
+        // A limit in dBm differs from the same limit in W by a rounding error.
         if (least * (1.0 - 1e-9)..=most * (1.0 + 1e-9)).contains(&eirp_w) {
             return Ok(Some(eirp_w.clamp(least, most)));
         }
@@ -788,10 +793,10 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
     })
 }
 
-/// Largest accepted error of the interference, dB, from treating an interferer as if on the ground.
+/// Largest accepted error of the interference, dB, if an interferer's height is ignored.
 ///
-/// An interferer so far above or below the ground that the error is larger is rejected. The error is checked at every
-/// position that relays or Rx may have.
+/// An interferer whose height causes a larger error is rejected. The error is checked at all positions that relays or
+/// Rx may have.
 const MAX_HEIGHT_ERROR_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -832,7 +837,7 @@ impl RawSource {
     }
 }
 
-/// Converts the areas of the `[[interferer]]` tables. Returns an error if an area contains Tx or Rx.
+/// Converts the areas of the `[[interferer]]` tables, by index. An area with Tx or Rx inside is an error.
 fn source_areas(
     file: &str,
     raw: &[RawSource],
@@ -947,7 +952,9 @@ fn polygon(file: &str, key: &str, corners: Vec<[f64; 2]>) -> Result<Area, Scenar
     })
 }
 
-/// Converts latitude and longitude, degrees, to x along the line and y to its right, m.
+/// Converts latitude and longitude, degrees, to x and y, m.
+///
+/// x is the distance from Tx toward Rx, and y the offset to the right as seen from Tx.
 fn near_line(
     file: &str,
     key: &str,
@@ -969,7 +976,7 @@ fn near_line(
     })
 }
 
-/// Returns the allowed positions for a position, latitude and longitude, that is too far from the line.
+/// Returns the part of an error message with the allowed positions. The given position is too far away.
 fn far_from(line: &Line, [lat, lon]: [f64; 2]) -> String {
     let at = |lat, lon| Geodetic::from_degrees(lat, lon, 0.0);
     let away_m = at(lat, lon).and_then(|point| line.axis.away_m(point));
@@ -989,7 +996,6 @@ fn far_from(line: &Line, [lat, lon]: [f64; 2]) -> String {
     )
 }
 
-/// Converts the `[[no_fly]]` tables of a file.
 fn no_fly(
     file: &str,
     raw: Vec<RawNoFly>,
@@ -1051,9 +1057,9 @@ fn no_fly(
     Ok(all)
 }
 
-/// Reads the outer boundaries of all polygons of a GeoJSON file, as latitude and longitude, degrees.
+/// Reads the outer boundary of each polygon in a GeoJSON file: latitudes and longitudes, degrees.
 ///
-/// `name` is relative to the folder of the scenario. Holes in a polygon are ignored: they are part of the area.
+/// The path `name` is relative to the folder of the scenario file. A hole in a polygon counts as part of the area.
 fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, ScenarioError> {
     let fail = |why: String| {
         let allowed = format!(
@@ -1072,7 +1078,7 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
         let Some(kind) = value.get("type").and_then(|kind| kind.as_str()) else {
             return Err(fail("has an object without a type".to_owned()));
         };
-        // A part that is left out would be airspace in which relays fly.
+        // Relays would fly into a no-fly area that is ignored here.
         let lacks = |part: &str| fail(format!("has a {kind} without {part}"));
         let list = |key: &str| {
             let list = value.get(key).and_then(|list| list.as_array());
@@ -1119,7 +1125,7 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
         let mut rings = rings.into_iter();
         let boundary = Area::Polygon(rings.next().unwrap_or_default());
         for (hole, corners) in (2..).zip(rings) {
-            // A centimetre, because a hole may touch the boundary.
+            // About a centimetre, in degrees: a hole may touch the boundary.
             if corners.iter().any(|at| boundary.distance_m(*at) > 1e-7) {
                 return Err(fail(format!(
                     "polygon {number}: ring {hole} is not inside ring 1, and the first ring has to be the outer boundary"
@@ -1134,10 +1140,10 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
 /// Least distance of an interferer from Tx and Rx, m.
 const LEAST_APART_M: f64 = 1.0;
 
-/// Distance from the line, m, above which latitude and longitude are probably swapped.
+/// Distance from the line Tx-Rx, m, above which latitude and longitude are probably swapped.
 const SWAPPED_M: f64 = 1e6;
 
-/// Converts the `[[interferer]]` tables of a file to EIRPs and positions. Their keys must have been checked.
+/// Converts the `[[interferer]]` tables, whose keys have been checked, to EIRPs and positions.
 pub(super) fn sources(
     file: &str,
     raw: &[RawSource],
@@ -1172,10 +1178,10 @@ pub(super) fn sources(
     .collect()
 }
 
-/// Converts an interferer's latitude and longitude to x, along the line to Rx, and y, to its right, m.
+/// Converts an interferer's latitude and longitude to x and y, m.
 ///
-/// It is an error if the file has no `[site]`, if the interferer is too far away, or if its height changes the
-/// interference too much.
+/// Errors: no `[site]` in the file, an interferer that is too far away, or a height that changes the interference too
+/// much.
 fn on_earth(
     file: &str,
     table: &str,
@@ -1235,10 +1241,10 @@ fn on_earth(
 }
 
 impl RelayArea<'_> {
-    /// Returns the largest error of the interference, dB, from treating an interferer as if on the ground.
+    /// Returns the largest error of the interference, dB, if the interferer's height is ignored.
     ///
-    /// The interferer is at (`x_m`, `y_m`), `above_m` over the ground, m. The error is checked at Rx and, for 65
-    /// altitudes, at the relay position nearest to the interferer, where it is largest.
+    /// The interferer is at (`x_m`, `y_m`) and `above_m` over the ground, m. The error is checked at Rx, and at 65
+    /// altitudes of the relay position nearest to the interferer: there it is largest.
     fn height_error_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;
         let ratio_db = |beside_m: f64, h: f64| {
@@ -1252,7 +1258,7 @@ impl RelayArea<'_> {
         let at_relays = (0..=STEPS)
             .map(|step| low + (high - low) * f64::from(step) / f64::from(STEPS))
             .map(|h| ratio_db(nearest, h));
-        // An interferer at Rx drowns it at any height.
+        // The SIR at Rx is 0 if the interferer is at Rx, whatever its height.
         let at_rx = (x_m - self.distance_m).hypot(y_m);
         let at_rx = if at_rx > 0.0 {
             ratio_db(at_rx, 0.0)

@@ -1,45 +1,46 @@
-//! The hypothetical interferer closest to several. The paper's "Extension to Multiple Sources of Interference".
+//! Single hypothetical interferer that replaces several. The paper's "Extension to Multiple Sources of Interference".
 //!
-//! Minimises the integral, over [0, D] and the altitude band, of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - the same summed over the
-//! true sources|. The best p_H at a position is a weighted median ([`Raster::best_power`]); the position is searched on a grid, then
-//! by simplexes from the grid's best local minima and from the true sources. The global minimum may be missed: a test compares
-//! the result with 20 000 random positions in each of 20 scenes.
+//! The fit minimises the integral of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - S| over [0, D] and all altitudes. S is the
+//! sum of the same term over the true interferers. The best p_H at a position is a weighted median
+//! ([`Raster::best_power`]). The position is searched on a grid, and then by simplexes from the grid's best local
+//! minima and from the true interferers. The global minimum may be missed: a test compares the result with 20 000
+//! random positions in each of 20 scenes.
 //!
-//! The paper restricts x_H to [0, D]. Interferers that are all beyond Rx are not well represented there, so here x_H may reach
-//! the outermost interferer. y_H is at most 30 times the size of the scene, where the interference is uniform to a thousandth.
+//! The paper restricts x_H to [0, D]. This does not fit if all interferers are beyond Rx, so here x_H may reach the
+//! outermost interferer. y_H is at most 30 times the size of the scene: the interference is then uniform to a
+//! thousandth.
 
 use super::Source;
 use super::scene::{Place, Scene};
 
-/// Approximate number of points at which the grid search evaluates the error of a fitted interferer. They are few,
-/// because the search evaluates the error at many positions.
+/// Approximate number of quadrature points for the first searches, which evaluate many positions.
 const COARSE: usize = 400;
 
-/// Approximate number of points at which the final search evaluates the error of a fitted interferer.
+/// Approximate number of quadrature points for the last searches.
 const FINE: usize = 4_000;
 
-/// Number of steps from Tx to Rx in a grid of relay positions. [`Hypothetical::sided`] compares an interferer on both
-/// sides of the line at these positions.
+/// Number of steps from Tx to Rx in the grid of relay positions of [`Hypothetical::sided`].
 const ALONG: u32 = 64;
-/// Number of lateral steps in a grid of relay positions. [`Hypothetical::sided`] compares an interferer on both sides
-/// of the line at these positions.
+/// Number of lateral steps in the grid of relay positions of [`Hypothetical::sided`].
 const ASIDE: u32 = 8;
 
-/// Approximate number of points at which the reported error of the fitted interferer is evaluated.
+/// Approximate number of quadrature points for the reported error.
 const REPORTED: usize = 60_000;
 
-/// Largest lateral distance y_H of the interferer in the search, as a multiple of the scene's size.
+/// Largest lateral distance y_H in the search, as a multiple of the scene's size.
 ///
-/// At this distance the interference differs by at most a thousandth between the relay positions, so that a larger
-/// distance would change nothing. The size of the scene is its largest extent in x, y or altitude.
+/// At this distance the interference at all relay positions is equal to a thousandth. The size of the scene is its
+/// largest extent in x, y or altitude.
 const FAR: f64 = 30.0;
 
-/// Grid step of the search for the lateral distance y_H of the interferer. The grid is even in u = asinh(y_H / lowest
-/// altitude), so its steps in y_H grow: far from the line each multiplies y_H by about 1.4.
+/// Grid step of the search in u = asinh(y_H / lowest altitude).
+///
+/// y_H is the lateral distance of the interferer. Far from the line Tx-Rx each step multiplies y_H by about 1.4.
 const RISE: f64 = 0.35;
 
-/// Largest number of local searches that start at local minima of the grid. At most the same number of further searches
-/// start at true interferers.
+/// Largest number of local searches that start at minima of the grid.
+///
+/// As many further searches start at true interferers.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
@@ -51,22 +52,23 @@ pub struct Hypothetical {
     pub power_w: f64,
     /// Position of the hypothetical interferer along the line from Tx to Rx (x_H), m.
     pub x_m: f64,
-    /// Lateral position of the hypothetical interferer (y_H), m; positive to the right of the line.
+    /// Lateral position of the hypothetical interferer (y_H), m; positive to the right as seen from Tx.
     pub y_m: f64,
-    /// Mean absolute error of the interference power, W, over the possible relay positions. These are in the vertical
-    /// plane from Tx to Rx.
+    /// Mean absolute error of the interference power at the possible relay positions, W.
+    ///
+    /// These positions are in the vertical plane from Tx to Rx.
     pub mean_abs_error_w: f64,
-    /// Relative error: integral of the absolute error / integral of the true interference. Both integrals are over
-    /// the possible relay positions. 0 is a perfect fit.
+    /// Integral of the absolute error, divided by the integral of the true interference.
+    ///
+    /// Both integrals are over the possible relay positions. 0 is a perfect fit.
     pub relative_error: f64,
 }
 
 impl Hypothetical {
-    /// Returns this interferer, or its mirror image beyond the line if that has the smaller error.
+    /// Returns this interferer or its mirror image at the line Tx-Rx, whichever has the smaller error.
     ///
-    /// The error is the sum of |ln(I_H / I)| over relay positions with lateral offsets from `least_m` to `most_m`, m,
-    /// where I_H is the interference from the hypothetical interferer and I the true one. Directly above the line,
-    /// I_H is equal for both sides.
+    /// The error is the sum of |ln(I_H / I)| over relay positions with lateral offsets from `least_m` to `most_m`, m.
+    /// I_H is the interference from the hypothetical interferer, I that from the true interferers.
     #[must_use]
     pub fn sided(self, scene: &Scene, least_m: f64, most_m: f64) -> Self {
         let other = Self {
@@ -84,7 +86,7 @@ impl Hypothetical {
                 h,
             })
             .collect();
-        // Compares ratios: otherwise the surroundings of an interferer would dominate.
+        // Ratios, not differences: otherwise the positions near an interferer would dominate.
         let error = |one: &Self| -> f64 {
             let each = places.iter().map(|at| {
                 let (dx, dy) = (at.x - one.x_m, at.y - one.y_m);
@@ -110,14 +112,14 @@ impl Hypothetical {
     }
 }
 
-/// Best position of the hypothetical interferer, for the quadrature points of a [`Raster`].
+/// Best position and power of the hypothetical interferer for the points of a [`Raster`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Position x_H of the hypothetical interferer along the line from Tx, m.
     pub x_m: f64,
-    /// Lateral distance y_H of the hypothetical interferer from the line, m, >= 0.
+    /// Distance y_H of the hypothetical interferer from the line Tx-Rx, m, >= 0.
     pub y_m: f64,
-    /// Best power of an interferer at this position, and the remaining error.
+    /// Best power of an interferer at (`x_m`, `y_m`), and the error that remains.
     pub best_power: BestPower,
 }
 
@@ -159,7 +161,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
         .take(FINALISTS)
         .map(|corner| space.descend(raster, corner.at, 0.2, 1e-6, 40))
         .min_by(|a, b| a.value.total_cmp(&b.value))?;
-    // Restarts the simplex, because one that has collapsed to a line would stay on it.
+    // A new simplex, because a simplex that has collapsed to a line stays on this line.
     let close = space.descend(raster, near.at, 0.05, 1e-9, 80);
     let best = space.descend(raster, close.at, 0.01, 1e-12, 80);
     let (x_m, y_m) = space.place(best.at);
@@ -170,9 +172,9 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     })
 }
 
-/// Returns the points (x, u) of the search space from which the local searches start.
+/// Returns the points (x, u) of the search space at which the local searches start.
 ///
-/// They are the deepest local minima of a grid, and the positions of the true interferers with the smallest errors.
+/// These are the deepest local minima of a grid, and the true interferers with the smallest errors.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -225,10 +227,9 @@ fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Search space of the interferer's position: x in metres, and u = asinh(y / lowest altitude).
+/// Search space of the interferer's position: x, m, and u = asinh(y / lowest relay altitude).
 ///
-/// y is the lateral distance from the line. u is linear in y below the lowest altitude of relays, and logarithmic
-/// above it.
+/// y is the lateral distance from the line Tx-Rx. u grows linearly for small y, and logarithmically for large y.
 struct Space {
     distance_m: f64,
     low: f64,
@@ -268,8 +269,10 @@ impl Space {
         raster.best_power(x, y).error
     }
 
-    /// Returns the grid of x, m, for the search. The spacing is D / 16 halfway between Tx and Rx, and grows toward both
-    /// ends of the grid. D is the distance from Tx to Rx.
+    /// Returns the grid of x for the search, m.
+    ///
+    /// Its spacing is D / 16 at the middle between Tx and Rx, and grows toward both ends. D is the distance from Tx to
+    /// Rx.
     fn columns(&self) -> Vec<f64> {
         let half = 0.5 * self.distance_m;
         let middle = Centre {
@@ -285,9 +288,8 @@ impl Space {
 
     /// Minimises the error by the simplex method from `start`, a point (x, u) of the search space.
     ///
-    /// `share` is the size of the first simplex as a fraction of the length over which the error changes noticeably.
-    /// The search ends when the errors at the simplex's corners agree to the relative `tolerance`, or after `most`
-    /// steps.
+    /// `share` is the size of the first simplex, as a fraction of the length over which the error changes noticeably.
+    /// The search ends when the errors at the corners agree to the relative `tolerance`, or after `most` steps.
     fn descend(
         &self,
         raster: &Raster,
@@ -401,7 +403,8 @@ impl Raster {
     fn with_step(scene: &Scene, sharp: &[(f64, f64)], step: f64) -> Self {
         let band = scene.band;
         let rows = if band.most_m > band.least_m {
-            // Lines of equal power are circles about (x, y = 0, h = 0), so above a source the width is its offset.
+            // Lines of equal power are circles about (x, y = 0, h = 0), so right above an interferer the width is its
+            // offset.
             let centres: Vec<Centre> = sharp
                 .iter()
                 .map(|&(_, width)| Centre { at: 0.0, width })
@@ -501,8 +504,9 @@ impl Raster {
     }
 }
 
-/// Returns two Gauss points, with weights, in each cell between neighbouring `ends`. They integrate cubic functions
-/// exactly.
+/// Returns two Gauss points, with weights, for each cell between neighbouring `ends`.
+///
+/// They integrate cubic functions exactly.
 fn gauss(ends: &[f64]) -> Vec<WeightedCoordinate> {
     let cells = ends.iter().zip(ends.iter().skip(1));
     cells
@@ -514,8 +518,9 @@ fn gauss(ends: &[f64]) -> Vec<WeightedCoordinate> {
         .collect()
 }
 
-/// Power of a single interferer, W, that gives the right interference at one quadrature point. Also the point's weight in the median over
-/// all points.
+/// Value and weight of one quadrature point for the weighted median.
+///
+/// The value is the power of a single interferer, W, that gives the right interference at this point.
 struct Ratio {
     value: f64,
     weight: f64,
@@ -543,33 +548,28 @@ fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     median
 }
 
-/// Coordinate at which a sampled function changes fastest. A grid has its smallest cells there.
-///
-/// The size of these cells depends on `width`.
+/// Coordinate at which a sampled function changes fastest; a grid has its smallest cells there.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
-    /// Coordinate at which the sampled function changes fastest, m. It is an x or an altitude, like the other values
-    /// of the grid.
+    /// Coordinate of the fastest change, m: an x or an altitude.
     pub at: f64,
-    /// Length over which the sampled function changes noticeably at `at`, m.
+    /// Length over which the function changes noticeably at `at`, m. It determines the size of the cells.
     pub width: f64,
 }
 
 impl Centre {
-    /// Returns the length over which the function changes at `x`. It grows with the distance from `at`.
-    ///
-    /// It is the hypotenuse of two lengths: the distance from `x` to `at`, and `width`.
+    /// Returns the length over which the function changes at `x`, m: sqrt((x - at)^2 + width^2).
     fn scale(&self, x: f64) -> f64 {
         (x - self.at).hypot(self.width)
     }
 }
 
-/// Returns the ends of the grid's cells from `low` to `high`, in increasing order. Cells are smaller near the
-/// `centres`.
+/// Returns the ends of a grid's cells from `low` to `high`, ascending. Cells are smaller near `centres`.
 ///
-/// A cell is at most 1.5 times as wide as the smaller of two lengths: `widest`; and `step` (below 1) times the length
-/// over which the function changes at the cell. There are about (high - low) / widest ends, and
-/// 2 ln(2 (high - low) / width) / step more for each centre.
+/// A cell is at most 1.5 times as wide as the smaller of two lengths. One is `widest`. The other is `step` (below 1)
+/// times the length over which the function changes at the cell.
+///
+/// The number of ends is about (high - low) / widest, and 2 ln(2 (high - low) / width) / step more for each centre.
 pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -> Vec<f64> {
     let mut ends = vec![low];
     let mut at = low;
@@ -578,7 +578,7 @@ pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -
             .iter()
             .map(|centre| step * centre.scale(at))
             .fold(widest, f64::min);
-        // A remainder of less than half a cell is merged with the last cell.
+        // A remainder of less than half a cell is added to the last cell.
         at = if at + 1.5 * width < high {
             at + width
         } else {
@@ -595,11 +595,10 @@ struct Corner {
     value: f64,
 }
 
-/// Returns the lowest point that the simplex method finds from `start`, with its value. It is never worse than
-/// `start`.
+/// Minimises `f` by the simplex method. Returns the best point found, never worse than `start`.
 ///
 /// `steps` is the size of the first simplex. The search ends when the values at the corners agree to the relative
-/// `tolerance`, or after `most` steps of at most four evaluations of `f`.
+/// `tolerance`, or after `most` steps. A step takes at most four evaluations of `f`.
 fn minimise(
     f: impl Fn((f64, f64)) -> f64,
     start: (f64, f64),
@@ -639,7 +638,7 @@ fn minimise(
         corners = sorted(if tried.value < worst.value {
             [best, middle, tried]
         } else {
-            // No improvement along that line: shrinks the simplex toward the best corner.
+            // No improvement: shrinks the simplex toward its best corner.
             let drawn = |other: Corner| corner(between(best.at, other.at, 0.5));
             [best, drawn(middle), drawn(worst)]
         });
@@ -648,8 +647,9 @@ fn minimise(
     best
 }
 
-/// Returns the point at the fraction `share` of the way from `from` to `to`. If `share` is above 1, the point lies
-/// beyond `to`.
+/// Returns the point at the fraction `share` of the way from `from` to `to`.
+///
+/// Above 1 the point is beyond `to`.
 fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
     (
         from.0 + share * (to.0 - from.0),
@@ -680,8 +680,7 @@ mod tests {
         close(median(&[]), 0.0);
     }
 
-    /// Checks that the simplex method finds a narrow minimum even if the first simplex is much wider. The method then
-    /// has to shrink the simplex.
+    /// Checks that the simplex method finds a narrow minimum although the first simplex is much wider.
     #[test]
     fn a_simplex_that_is_too_large_shrinks() {
         let pit = |(x, y): (f64, f64)| {

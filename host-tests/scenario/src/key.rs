@@ -7,7 +7,7 @@ use std::path::Path;
 /// Reads the secret key in `file`. `option` is the command-line option that named the file, for error messages.
 ///
 /// # Errors
-/// A line with the option, the file and the problem, such as a file that other users can read; never the file's
+/// A text with the option, the file and the problem, such as a file that other users can read; never the file's
 /// content.
 pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     parse(&read(option, file)?).map_err(|error| format!("{option} {}: {error}", file.display()))
@@ -16,7 +16,7 @@ pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
 /// Reads a password from the first line of `file`. `option` is the command-line option that named the file.
 ///
 /// # Errors
-/// A line with the option, the file and the problem, as for a key; never the file's content.
+/// A text with the option, the file and the problem, as for a key; never the file's content.
 pub fn load_password(option: &str, file: &Path) -> Result<String, String> {
     let text = read(option, file)?;
     let password = text.lines().next().unwrap_or_default().trim();
@@ -37,7 +37,7 @@ fn read(option: &str, file: &Path) -> Result<String, String> {
 
 /// Rejects a key file that users other than its owner and group can read or write.
 ///
-/// A file that is missing or unreadable passes: reading it fails afterwards.
+/// A missing or unreadable file is accepted here; reading it fails later.
 #[cfg(unix)]
 fn check_mode(file: &Path) -> Result<(), String> {
     use std::os::unix::fs::PermissionsExt as _;

@@ -1,6 +1,6 @@
 //! Table of all keys of a scenario file and their allowed values.
 //!
-//! The checks and the error messages both use it, so they cannot disagree.
+//! Checks and error messages use the same table, so they cannot disagree.
 
 use core::fmt;
 
@@ -25,21 +25,20 @@ pub(super) enum Rule {
     /// Text "los" (line of sight) or "nlos" (obstructed), or a number within this range.
     LinkOrNumber(Range),
     Flag,
-    /// Number within this range, or a list of two such numbers: the least and the greatest.
+    /// A number within this range, or a list of two: the least and the greatest.
     NumberOrTwo(Range),
-    /// List of exactly one number for each of these ranges.
+    /// List with one number for each of these ranges.
     Numbers(&'static [Range]),
-    /// List of such points, each a list with one number for each of these ranges. Also the least and greatest number of
-    /// points.
+    /// List of points, each with one number for each range. The pair has the least and greatest number of points.
     Points(&'static [Range], [usize; 2]),
     Choice(&'static [&'static str]),
     Text,
-    /// Value of a key that must be a list of at least one text, none of them empty.
+    /// Non-empty list of non-empty texts.
     Texts,
     /// Text that names a serial port or the UDP address of an autopilot.
     TtyOrUdp,
     Table(Keys),
-    /// List of tables, each with these keys; at least the given number of tables.
+    /// List of tables with these keys. The number is the smallest number of tables.
     Tables(Keys, usize),
 }
 
@@ -47,14 +46,14 @@ pub(super) enum Rule {
 pub(super) enum Need {
     Always,
     Never,
-    /// Key that a table must have, if the table has none of these other keys.
+    /// Required if the table has none of these other keys.
     Unless(&'static [&'static str]),
 }
 
 pub(super) struct Key {
     pub(super) name: &'static str,
     pub(super) need: Need,
-    /// Other keys that are forbidden beside this key, because their meanings overlap.
+    /// Keys that must not be given together with this key.
     pub(super) without: &'static [&'static str],
     pub(super) rule: Rule,
 }
@@ -97,7 +96,7 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Creates a key that a table must have if it has none of the keys `others`. A table with both this key and one of `others` is rejected.
+/// Creates a key that is required if the table has none of the keys `others`. It excludes all of them.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),
@@ -105,7 +104,7 @@ const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule)
     }
 }
 
-/// Creates an optional key that may not be given beside any of `others`.
+/// Creates an optional key that excludes the keys `others`.
 const fn without(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         name,
@@ -115,7 +114,7 @@ const fn without(others: &'static [&'static str], name: &'static str, rule: Rule
     }
 }
 
-// Up to the altitude of aircraft.
+// The upper limit is about the altitude of airliners.
 const ALTITUDE: Range = range(0.1, 1e4, "m");
 const POWER: Range = range(1e-6, 1e6, "W");
 const POWER_DBM: Range = range(-30.0, 90.0, "dBm");
@@ -261,13 +260,13 @@ const INTERFERER: Keys = &[
     optional("mast_m", Number(range(0.0, 1000.0, "m"))),
 ];
 
-/// Largest number of corners of a polygon.
+/// Largest number of corners of a polygon in a file.
 pub(super) const MOST_CORNERS: usize = 500;
 const XY: &[Range] = &[PLACE, PLACE];
 const ON_EARTH: &[Range] = &[LATITUDE, LONGITUDE];
 const RADIUS: Range = range(1.0, 1e6, "m");
 
-// Each kind of area excludes the kinds after it.
+// Each kind of area excludes the kinds that follow it.
 const AREA: Keys = &[
     unless(
         &[
@@ -329,7 +328,7 @@ const BETA: Keys = &[
 ];
 
 impl Key {
-    /// Returns true if the key is required in `table`. The caller knows that `table` does not have the key.
+    /// Returns true if `table` must have this key. The caller has checked that the key is absent.
     pub(super) fn is_missed(&self, table: &Table) -> bool {
         match self.need {
             Need::Always => true,
@@ -338,7 +337,7 @@ impl Key {
         }
     }
 
-    /// Returns the keys that the table may have in place of this required key. `keys` are all keys of the table.
+    /// Returns the keys among `keys` that the table may have in place of this required key.
     pub(super) fn alternatives(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,
@@ -353,7 +352,7 @@ impl Key {
 
 impl Range {
     pub(super) fn holds(&self, value: f64) -> bool {
-        // A NaN fails the first comparison, an infinity one of the two.
+        // NaN fails the first comparison; an infinity fails one of the two.
         let low = if self.open {
             value > self.low
         } else {
@@ -421,8 +420,9 @@ impl fmt::Display for Rule {
     }
 }
 
-/// Returns the names of all keys that a scenario file may have, as `table.key`. A list of tables is treated as one
-/// table.
+/// Returns the names of all keys of a scenario file, as `table.key`.
+///
+/// A list of tables counts as one table.
 pub fn all() -> Vec<String> {
     let mut names = Vec::new();
     collect("", FILE, &mut names);

@@ -11,9 +11,9 @@
 //! | [`key`] | secret keys, from files |
 //! | [`number`] | conversion from the f64 of files to the f32 of relays |
 //!
-//! A file is read in three passes: `check` compares its shape, keys, types and ranges with the table in `keys`; serde converts it
-//! to typed values; `file` checks conditions on several keys. Mistakes are reported as a [`ScenarioError`], one line that names
-//! the file, the key, the value and the allowed values.
+//! A file is read in three steps: `check` compares its shape, keys, types and ranges with the table in `keys`; serde
+//! converts it to typed values; `file` checks conditions on several keys. Mistakes are reported as a [`ScenarioError`],
+//! one line that names the file, the key, the value and the allowed values.
 
 pub mod area;
 mod check;
@@ -55,8 +55,8 @@ impl Scenario {
     /// Parses a scenario from TOML text; `file_name` is used only in error messages.
     ///
     /// # Errors
-    /// The first mistake found: invalid TOML, an unknown or missing key, a value of the wrong type or out of its range (NaN and
-    /// infinities are out of every range), or keys that contradict each other.
+    /// The first mistake found: invalid TOML, an unknown or missing key, a value of the wrong type or out of its range,
+    /// or keys that contradict each other. NaN and infinities are out of every range.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
         let table = check::table_of(file_name, text)?;
         check::table(file_name, &table)?;
@@ -84,8 +84,8 @@ impl deployment::Deployment {
 
     /// Parses only the settings in `[network]`, `[companion]` and `[ground]` of a scenario file.
     ///
-    /// Unlike [`Self::load`], it accepts a number of relays that differs from the plan, because the caller is about
-    /// to replace the plan. `file_name` is used only in error messages.
+    /// Unlike [`Self::load`], it accepts a number of relays that differs from the plan. `file_name` is used only in
+    /// error messages.
     ///
     /// # Errors
     /// Invalid TOML, and any mistake in a section.

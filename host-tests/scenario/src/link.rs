@@ -1,6 +1,6 @@
 //! Data link: how the hops share the radio, and the data rate that an SINR carries.
 //!
-//! With the bandwidth B, the spectral efficiency b in bit/s/Hz of a [`RateModel`] and N + 1 hops a chain carries
+//! B is the bandwidth, and b the spectral efficiency of a [`RateModel`] in bit/s/Hz. A chain of N + 1 hops carries
 //!
 //! ```text
 //! slots      R = B b(SINR of the worst hop) / (N + 1)    one frequency, equal time slots, as the paper assumes
@@ -10,15 +10,15 @@
 //!
 //! These formulas are defined only here ([`Radio::chain_bps`]).
 //!
-//! Where data goes both ways, each direction has half of the time: two slots for each hop. Fitted slots of a chain that is planned
-//! for both directions ([`Scenario::reverse`] r > 0) are as long as the data of both directions needs, r times as much on the way
-//! back ([`Radio::both_bps`]):
+//! If data goes both ways, each direction has half of the time: two slots for each hop. A chain can be planned for both
+//! directions ([`Scenario::reverse`] r > 0), with r times as much data back to Tx as to Rx. Its fitted slots are as
+//! long as the data of both directions needs ([`Radio::both_bps`]):
 //!
 //! ```text
 //! fitted     1 / R = sum over hops of (1 / (B b(F)) + r / (B b(B)))      R to Rx and r R back, with the SINRs F and B of a hop
 //! ```
 //!
-//! The larger min(R to Rx, R back / r), the better the chain ([`worse_bps`]).
+//! A chain is better if min(R to Rx, R back / r) is larger ([`worse_bps`]).
 
 use std::fmt;
 
@@ -31,12 +31,12 @@ use crate::number::factor;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Access {
-    /// A single frequency. Each of the N + 1 hops has one of N + 1 equal time slots.
+    /// A single frequency for all hops. Each of the N + 1 hops has one of N + 1 equal time slots.
     #[default]
     Slots,
-    /// A separate frequency for each hop, so that all hops send at the same time.
+    /// A frequency for each hop. All hops send at the same time.
     Channels,
-    /// A single frequency. The length of each hop's time slot is such that all hops carry the same amount of data.
+    /// A single frequency for all hops. Each hop's time slot is as long as the hop needs for the same amount of data.
     Fitted,
 }
 
@@ -53,9 +53,9 @@ impl Access {
         }
     }
 
-    /// Returns the number of slots in which each hop sends once, or once per direction if `both_ways`.
+    /// Returns the number of time slots in which each hop sends once, in each direction if `both_ways`.
     ///
-    /// If every hop has its own frequency, all hops send in the same slot: the number is then 1 per direction.
+    /// It is 1 per direction if every hop has its own frequency, because all hops then send at once.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
@@ -78,14 +78,14 @@ pub struct RateStep {
 /// Spectral efficiency of a hop as a function of its SINR.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RateModel {
-    /// Shannon's formula with a gap: the spectral efficiency is log2(1 + SINR / gap) bit/s/Hz.
+    /// Shannon's formula with a gap: log2(1 + SINR / gap) bit/s/Hz.
     Shannon {
         /// Loss of SINR relative to Shannon's limit, dB, 0 to 30.
         gap_db: f64,
     },
     /// Table of modulation and coding schemes. SINR and spectral efficiency increase strictly.
     ///
-    /// A hop uses the last scheme whose SINR it reaches. Below the first its spectral efficiency is 0.
+    /// A hop uses the last scheme whose SINR it reaches. Below the first SINR its spectral efficiency is 0.
     Steps(Vec<RateStep>),
 }
 
@@ -127,8 +127,9 @@ impl RateModel {
     }
 }
 
-/// Returns the data rate of the worse direction, bit/s, for comparing plans. It is the smaller of two rates: the rate
-/// to Rx, and the rate to Tx divided by `reverse`. If `reverse` is 0, only the rate to Rx counts.
+/// Returns the data rate of the worse direction, bit/s, to compare plans.
+///
+/// It is the smaller of `there_bps` and `back_bps` / `reverse`. If `reverse` is 0, it is `there_bps`.
 pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
     if reverse > 0.0 {
         there_bps.min(back_bps / reverse)
@@ -151,7 +152,7 @@ pub struct Link {
 /// Data link of a chain with a known bandwidth. It computes data rates from SIRs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radio {
-    /// Medium access and spectral efficiency. `bandwidth_hz` is used in place of the bandwidth in this `Link`.
+    /// Medium access and spectral efficiency. The bandwidth in this `Link` is ignored.
     pub link: Link,
     /// Bandwidth of one frequency, Hz, 1 to 1e12.
     pub bandwidth_hz: f64,

@@ -13,26 +13,26 @@ use crate::number::{factor, narrow};
 use crate::scene::Scene;
 use crate::{Interference, Scenario, Source};
 
-/// Error: the reason for which a scenario is not a valid mission.
+/// Reason why a scenario is not a valid mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// An interferer may be anywhere in an area, but a mission needs a single position.
+    /// An interferer may be anywhere in an area, but a mission needs one position.
     ///
-    /// Contains the index of the interferer, from 0, and the middle of the area, x and y in m.
+    /// The fields are the index of the interferer, from 0, and the middle of its area, x and y, m.
     Area(usize, [f64; 2]),
     /// The scenario has several interferers, and no single hypothetical interferer can replace them.
     NoHypothetical,
     /// The distance from Tx to Rx is too short for the number of relays at their minimum separation.
     NoRoom {
-        /// Number of relays for which the distance is too short.
+        /// Number of relays that are too many for the distance.
         relays: u16,
         /// Minimum separation of two relays, m.
         apart_m: f32,
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// The scenario has fitted slots and a table of rate steps: relays fit slots only to Shannon's formula.
+    /// Fitted slots with a table of rate steps. Relays compute fitted slots only by Shannon's formula.
     Steps,
     /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),
@@ -74,10 +74,10 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// Converts a scenario to a mission of `uavs` relays. Also returns the relays that differ from the others.
+/// Converts a scenario to a mission of `uavs` relays, and the profiles of relays that differ.
 ///
-/// These are the relays with an altitude or a power of their own, as index (from 1) and profile. Several interferers
-/// are replaced by a single interferer.
+/// A relay differs if it has an altitude or a power of its own. Its index is counted from 1. Several interferers are
+/// replaced by one hypothetical interferer.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -161,11 +161,10 @@ pub fn mission(
 
 /// Returns `mission` with the fitted slots of the scenario, if it has any.
 ///
-/// Only relays with the method `joint` fly this mission. With other methods the relays have equal slots.
+/// Relays use them only with the method `joint`; with other methods their slots are equal.
 ///
 /// # Errors
-/// [`Refusal::Steps`] for fitted slots with a table of rate steps; [`Refusal::Mission`] if the SNR gap is out of
-/// range.
+/// [`Refusal::Steps`] for fitted slots with a table of rate steps; [`Refusal::Mission`] if the SNR gap is out of range.
 pub fn with_access(scenario: &Scenario, mission: &Mission) -> Result<Mission, Refusal> {
     let fitted_gap = match &scenario.link {
         Some(Link {
@@ -199,7 +198,7 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     }
 }
 
-/// Returns an error line if the scenario has a `[[relay]]` whose index exceeds `uavs`. Otherwise `None`.
+/// Returns an error line if the scenario has a `[[relay]]` with an index above `uavs`.
 pub fn undescribed_relay_error(scenario: &Scenario, uavs: u16) -> Option<String> {
     let (index, _) = scenario.relays.last_key_value()?;
     (*index > uavs).then(|| {
@@ -207,7 +206,7 @@ pub fn undescribed_relay_error(scenario: &Scenario, uavs: u16) -> Option<String>
     })
 }
 
-/// Returns the indices, from 1, of relays up to `uavs` for which the scenario sets a fixed altitude.
+/// Returns the indices, from 1, of the relays up to `uavs` with a fixed altitude in the scenario.
 pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
     scenario
         .relays
@@ -217,10 +216,9 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission before the first measurements, with equal interference everywhere.
+/// Returns `mission` with the same interference at every x, for the time before any measurement.
 ///
-/// The mean of the inverse interference at Rx replaces the means at all other positions. A mission without a random
-/// field is returned unchanged.
+/// The mean of 1 / I at Rx is used at every x; I is the interference. A mission without a random field is unchanged.
 #[must_use]
 pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();
@@ -244,10 +242,9 @@ pub fn with_uniform_field(mission: &Mission) -> Mission {
         .unwrap_or(*mission)
 }
 
-/// Returns alpha and beta of the Beta distribution of I / `i_max_w` at `x_m`. I is the interference.
+/// Returns alpha and beta of the Beta distribution of I / `i_max_w` at `x_m`; I is the interference.
 ///
-/// Between two points of the field, alpha and the mean of `i_max_w` / I are interpolated. Beta follows from these
-/// two.
+/// Between two points of the field, alpha and the mean of `i_max_w` / I are interpolated. They determine beta.
 pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);

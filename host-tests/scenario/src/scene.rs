@@ -8,33 +8,34 @@ use uav_relay::{Channel, Placement};
 use crate::area::Area;
 use crate::{Interference, Scenario, Source};
 
-/// A relay of a chain in a [`Scene`]: its altitude and its transmit power.
+/// Relay of a chain in a [`Scene`]: its altitude and its transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
     /// Altitude of the relay, m, > 0. The joint methods may change it unless `holds` is true.
     pub altitude_m: f64,
-    /// Transmit power of the relay, W, > 0.
+    /// Transmit power (EIRP) of the relay, W, > 0.
     pub power_w: f64,
     /// True if the relay keeps its altitude, even outside the altitude limits of the other relays.
     pub holds: bool,
 }
 
-/// Limits on the altitudes and lateral positions of relays, m. A lateral position is the offset from the line Tx to
-/// Rx. It is positive to the right as seen from Tx toward Rx.
+/// Limits of the altitudes and lateral positions of relays, m.
+///
+/// A lateral position is the offset from the line Tx-Rx, positive to the right as seen from Tx toward Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
     /// Lowest altitude of a relay, m, > 0.
     pub least_m: f64,
     /// Highest altitude of a relay, m.
     pub most_m: f64,
-    /// Lateral limit to the left of the line, as seen from Tx toward Rx, m, <= 0.
+    /// Smallest lateral position (left limit as seen from Tx toward Rx), m, <= 0.
     pub left_m: f64,
-    /// Lateral limit to the right of the line, as seen from Tx toward Rx, m, >= 0.
+    /// Largest lateral position (right limit as seen from Tx toward Rx), m, >= 0.
     pub right_m: f64,
 }
 
 impl Corridor {
-    /// Creates limits without lateral offsets: the vertical plane from Tx to Rx, between two altitudes, m.
+    /// Creates limits without lateral offsets, for altitudes from `least_m` to `most_m`, m.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,
@@ -45,7 +46,7 @@ impl Corridor {
     }
 }
 
-/// A chain of relays from Tx at (0, 0) to Rx at (D, 0), and any number of interferers.
+/// Chain of relays from Tx at (0, 0) to Rx at (D, 0), and any number of interferers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// Distance D from Tx to Rx, m, > 0.
@@ -56,20 +57,18 @@ pub struct Scene {
     pub tx_w: f64,
     /// Transmit power of Rx when it sends toward Tx, W, > 0.
     pub rx_w: f64,
-    /// SIR that hops need from Rx to Tx, as a fraction of the SIR needed from Tx to Rx. It is 0 if only the direction
-    /// to Rx counts.
+    /// Required SIR toward Tx, as a fraction of the required SIR toward Rx. It is 0 if only the direction to Rx counts.
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
-    /// Areas of sources whose positions are uncertain, by index in `sources`.
+    /// Areas of interferers whose positions are uncertain, by index in `sources`.
     ///
-    /// Such a source may be anywhere in its area. Each receiver gets the interference from the area's point nearest to
-    /// it, so that the SIR of a hop is the SIR for the worst position of the source.
+    /// Each receiver gets the interference from the area's point nearest to it. The SIR of a hop is therefore the SIR
+    /// for the worst position of the interferer.
     pub areas: BTreeMap<usize, Area>,
-    /// Least and greatest altitude of the sources, m, by index in `sources`.
+    /// Least and greatest altitude of each interferer, m, by index in `sources`; 0 if it is not in the map.
     ///
-    /// The altitude of a source that is not in the map is 0. For each receiver, a source is at the altitude nearest to the receiver within
-    /// these limits.
+    /// For each receiver the interferer is at the altitude within these limits that is nearest to the receiver's.
     pub heights_m: BTreeMap<usize, [f64; 2]>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
     pub mu_los: f64,
@@ -88,9 +87,9 @@ pub struct Scene {
 /// Position of a relay relative to the line from Tx to Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Distance of the relay from Tx along the line to Rx, m.
+    /// Distance of the relay from Tx toward Rx, m.
     pub x: f64,
-    /// Lateral position of the relay, m; positive to the right of the line, as seen from Tx toward Rx.
+    /// Lateral position of the relay, m; positive to the right as seen from Tx toward Rx.
     pub y: f64,
     /// Height of the relay above ground, m, > 0.
     pub h: f64,
@@ -159,7 +158,7 @@ impl Scene {
         })
     }
 
-    /// Returns the interference power at a relay at the position `at`, W: the sum over all sources.
+    /// Returns the interference power that a relay at `at` receives, W: the sum over all sources.
     pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
         let Place { x, y, h } = at.into();
         let each = self.offsets(x, y).enumerate();
@@ -169,13 +168,13 @@ impl Scene {
         .sum()
     }
 
-    /// Returns the height of a receiver at the altitude `h_m` above the source with index `at`, m.
+    /// Returns the height of a receiver above source `at`, m. The receiver is at the altitude `h_m`.
     fn climb_m(&self, at: usize, h_m: f64) -> f64 {
         let [low, high] = self.heights_m.get(&at).copied().unwrap_or_default();
         h_m - h_m.clamp(low, high)
     }
 
-    /// Returns the interference power at Rx, W; infinite if an interferer is at the same point as Rx.
+    /// Returns the interference power at Rx, W; infinite if an interferer is exactly at Rx.
     pub fn interference_rx_w(&self) -> f64 {
         self.interference_on_ground_w(self.distance_m)
     }
@@ -224,9 +223,9 @@ impl Scene {
 
     /// Returns the linear SIRs of the N + 1 hops from Rx to Tx, with relay k at `places[k - 1]`.
     ///
-    /// Entry k - 1 is the SIR of the hop from node k to node k - 1, with the interference at node k - 1. Node 0 is Tx
-    /// and node N + 1 is Rx. A SIR is infinite if its two nodes share a position. The list is empty unless there is one
-    /// position per relay, and at least one relay.
+    /// Node 0 is Tx, node k relay k, and node N + 1 Rx. Entry k - 1 is the SIR of the hop from node k to node k - 1. A
+    /// SIR is infinite if its two nodes share a position. The list is empty unless there is one position per relay, and
+    /// at least one relay.
     pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
             return Vec::new();
@@ -255,7 +254,7 @@ impl Scene {
         back.fold(there, |worst, sir| worst.min(sir / self.reverse))
     }
 
-    /// Returns the linear SIR of the worst hop for relays on the line, at the distances `along` from Tx, m.
+    /// Returns the linear SIR of the worst hop for relays with y = 0 and x = `along`, m.
     ///
     /// Each relay has its own altitude. Returns 0 unless there is one position per relay.
     pub fn sir_along(&self, along: &[f64]) -> f64 {

@@ -13,23 +13,23 @@ use super::number::{factor, narrow, watts};
 
 /// Parameters of a flight in a scenario file, in SI units.
 ///
-/// The coordinate x is the distance from Tx along the line to Rx, y the offset to the right of this line. Values from
-/// [`Scenario::load`] or [`Scenario::parse`] are within the ranges given here.
+/// x is the distance from Tx toward Rx, and y the offset to the right as seen from Tx. Values from [`Scenario::load`]
+/// or [`Scenario::parse`] are within the ranges given here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Line from Tx to Rx in geographic coordinates; `None` if the scenario has no `[site]`.
     pub line: Option<Line>,
     /// Distance D from Tx to Rx, m, 1 to 1e6.
     pub distance_m: f64,
-    /// Altitude of all relays without an altitude of their own, m, 0.1 to 1e4.
+    /// Altitude of all relays without their own altitude, m, 0.1 to 1e4.
     pub altitude_m: f64,
     /// Lowest altitude for methods that choose altitudes, m, 0.1 to `altitude_m` (its default).
     pub altitude_min_m: f64,
     /// Highest altitude for methods that choose altitudes, m, `altitude_m` (its default) to 1e4.
     pub altitude_max_m: f64,
-    /// Lateral limit to the left for the method `joint`, y in m, -1e5 to 0 (its default).
+    /// Smallest lateral position y for the method `joint` (left limit), m, -1e5 to 0 (its default).
     pub lateral_min_m: f64,
-    /// Lateral limit to the right for the method `joint`, y in m, 0 (its default) to 1e5.
+    /// Largest lateral position y for the method `joint` (right limit), m, 0 (its default) to 1e5.
     pub lateral_max_m: f64,
     /// Least distance between two relays, m, 0 (its default) to 1e5.
     pub min_separation_m: f64,
@@ -49,20 +49,19 @@ pub struct Scenario {
     pub areas: BTreeMap<usize, SourceArea>,
     /// Heights of the interferers' antennas above the ground, m, 0 to 1000, by index (from 0).
     ///
-    /// The height is 0 for an interferer that is not in the map. The planner uses the heights if there are elevation
-    /// files.
+    /// It is 0 for an interferer that is not in the map. The planner uses it only with elevation files.
     pub masts_m: BTreeMap<usize, f64>,
-    /// Areas in which relays may not fly, for the planner.
+    /// No-fly areas, for the planner.
     pub no_fly: Vec<NoFly>,
     /// Settings for relays that locate the interferer by measurements; `None` if they do not.
     ///
     /// [`Self::interference`] is then their initial knowledge, if any.
     pub listen: Option<ListenSpec>,
-    /// Noise of the receivers: of the relays and of Rx.
+    /// Noise of the receivers, both relays and Rx.
     pub noise: Noise,
     /// Data link, for data rates; `None` if the file has none.
     pub link: Option<Link>,
-    /// SIR that hops need from Rx to Tx, as a fraction (0 to 1) of the SIR that they need from Tx to Rx.
+    /// Required SIR toward Tx, as a fraction (0 to 1) of the required SIR toward Rx.
     ///
     /// With 0, only the direction from Tx to Rx counts.
     pub reverse: f64,
@@ -85,7 +84,9 @@ pub struct TerrainSpec {
     ///
     /// The height counts from the highest ground at the positions where the relay may be within its position error.
     pub above_ground_m: f64,
-    /// Greatest height of a relay above the ground below it, m; `None` for no limit.
+    /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
+    ///
+    /// It counts from the highest ground within the relay's position error.
     pub above_ground_max_m: Option<f64>,
     /// Error of the heights in the elevation files, m, 0 (its default) to 100.
     ///
@@ -138,7 +139,7 @@ pub struct ListenSpec {
     pub following: bool,
     /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
-    /// Half-life of a measurement: age at which it counts half as much as a new one, s, 0.01 to 1e12.
+    /// Age at which a measurement has half the weight of a new one, s, 0.01 to 1e12.
     pub half_life_s: Option<f64>,
     /// Relative error of one interference measurement, 1e-3 to 1.
     pub relative_error: Option<f64>,
@@ -166,7 +167,7 @@ impl ListenSpec {
     }
 }
 
-/// Receiver noise: either bandwidth and noise figure, or the noise power itself.
+/// Receiver noise: bandwidth and noise figure, or the noise power itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Noise {
     /// Noise bandwidth, Hz, 0 (its default: no noise) to 1e12.
@@ -200,8 +201,7 @@ impl Noise {
 
     /// Returns the noise power at the input of a receiver, W.
     ///
-    /// It is k T0 B F, with Boltzmann's constant k, the reference temperature T0, the bandwidth B and the noise
-    /// figure F, or the given power.
+    /// It is the given power, or k T0 B F: Boltzmann's constant, reference temperature, bandwidth and noise figure.
     pub fn receiver_w(&self) -> f64 {
         self.power_dbm.map_or_else(
             || BOLTZMANN * Self::STANDARD_K * self.bandwidth_hz * factor(self.figure_db),
@@ -211,17 +211,16 @@ impl Noise {
 
     /// Returns the noise power that a mission uses for all receivers, W.
     ///
-    /// It is [`Self::receiver_w`] divided by the antenna gain. If the gains of the relays and of Rx differ, the lower
-    /// one is used.
+    /// It is [`Self::receiver_w`] divided by the antenna gain: the lower one, if the gains of the relays and of Rx
+    /// differ.
     pub fn power_w(&self) -> f64 {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the mission's noise power is too high for some receivers. This is so if the antenna gains of
-    /// relays and Rx differ.
+    /// Returns true if there is noise, and the antenna gains of the relays and of Rx differ.
     ///
-    /// A mission has a single noise power for all receivers, which is right for the lowest antenna gain.
+    /// The mission has one noise power, for the lower gain. It is too high for the receivers with the higher gain.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
@@ -244,7 +243,7 @@ pub enum AirGround {
 pub enum Interference {
     /// Known interfering transmitters. The list is empty only if the relays have to locate an unknown interferer.
     Sources(Vec<Source>),
-    /// Interference power of which only the probability distribution at each x is known.
+    /// Interference with a known probability distribution of its power at each x.
     Field(Field),
 }
 
@@ -255,7 +254,7 @@ pub struct Source {
     pub power_w: f64,
     /// Position of the interferer along the line from Tx (0) to Rx, m, -1e7 to 1e7.
     pub x_m: f64,
-    /// Lateral position of the interferer, m, -1e7 to 1e7; positive to the right of the line.
+    /// Lateral position of the interferer, m, -1e7 to 1e7; positive to the right as seen from Tx.
     pub y_m: f64,
 }
 
@@ -268,7 +267,7 @@ pub struct Field {
     pub beta: Vec<BetaPoint>,
 }
 
-/// Beta distribution of the interference power at one position on the line.
+/// Beta distribution of the interference power at one x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BetaPoint {
     /// Position along the line from Tx to Rx, m, -1e7 to 1e7.
@@ -357,13 +356,12 @@ impl Scenario {
         link.is_some_and(|link| link.access == Access::Fitted)
     }
 
-    /// Returns true if the scenario gives the interference. False only if the relays have to locate an unknown
-    /// interferer.
+    /// Returns true if the scenario gives the interference; false if relays have to locate an interferer.
     pub fn knows_interference(&self) -> bool {
         !matches!(&self.interference, Interference::Sources(sources) if sources.is_empty())
     }
 
-    /// Returns power, W, and position x and y, m, of every interferer, for pictures. Empty for a random field.
+    /// Returns the power, W, and position x and y, m, of every interferer; empty for a random field.
     pub fn sources(&self) -> Vec<(f64, f64, f64)> {
         match &self.interference {
             Interference::Sources(sources) => {
@@ -395,7 +393,7 @@ pub struct Planned {
 pub enum PlannedMethod {
     /// Placement at fixed altitudes: the paper's Algorithm 1, or Algorithm 4 in a random field.
     Align,
-    /// Placement that chooses position along the line, lateral offset and altitude of each relay together.
+    /// Placement that chooses x, lateral offset and altitude of each relay together.
     Joint,
 }
 
@@ -403,9 +401,9 @@ pub enum PlannedMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedPlace {
-    /// Distance of the relay from Tx along the line to Rx, m.
+    /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
-    /// Lateral position of the relay, m; positive to the right of the line as seen from above.
+    /// Lateral position of the relay, m; positive to the right as seen from Tx toward Rx.
     pub y_m: f64,
     /// Altitude of the relay above ground, m, 0.1 to 1e4.
     pub altitude_m: f64,

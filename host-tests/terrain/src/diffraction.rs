@@ -2,8 +2,9 @@
 //!
 //! It is the "delta-Bullington" method.
 //!
-//! The Bullington construction replaces the terrain by one knife edge, where the horizons of the two antennas meet. The method adds
-//! the loss by which a smooth spherical earth exceeds the construction's loss above a smooth earth: L = La + max(Lsph - Ls, 0).
+//! The Bullington construction replaces the terrain by one knife edge, at the point where the horizons of the two
+//! antennas meet. Its loss is La above the terrain and Ls above a smooth earth. The true loss of the smooth earth is
+//! Lsph. The method returns L = La + max(Lsph - Ls, 0).
 //!
 //! | quantity | function | section of P.526-15 |
 //! | --- | --- | --- |
@@ -12,22 +13,23 @@
 //! | heights of the antennas above the smooth earth | `smooth_heights_m` | 4.5 |
 //! | Lsph, loss of the smooth earth | `spherical_db` | 3.2, with the first term of 3.1.1 |
 //!
-//! All lengths are in metres: with the effective earth radius a, the earth rises by d1 d2 / 2a between two points. The ground is that of
-//! average land (relative permittivity 22, 0.003 S/m), and the polarisation is vertical; above 100 MHz both have little effect.
+//! All lengths are in metres. At the distances d1 and d2 from two points, the earth rises by d1 d2 / 2a above the
+//! straight line between them; a is the effective earth radius. The ground is average land (relative permittivity 22,
+//! 0.003 S/m), and the polarisation is vertical; above 100 MHz both have little effect.
 
-/// Effective radius of the earth for radio propagation, m: 4/3 of its real radius.
+/// Effective radius of the earth for radio propagation, m: 4/3 of the real radius.
 pub const EARTH_M: f64 = 8.5e6;
 
 /// Speed of light, m/s.
 pub const LIGHT_M_S: f64 = 299_792_458.0;
 
-/// Point of a profile: distance from the first antenna along the ground, and height of the ground, m.
+/// Point of a profile: distance along the ground from the first antenna, and ground height, m.
 pub type Point = [f64; 2];
 
 /// Electrical properties of the ground, and the polarisation of the antennas.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Surface {
-    /// Relative permittivity of the ground, for the diffraction loss.
+    /// Relative permittivity of the ground.
     pub permittivity: f64,
     /// Conductivity of the ground, S/m.
     pub conductivity: f64,
@@ -45,15 +47,15 @@ impl Default for Surface {
     }
 }
 
-/// Returns the diffraction loss, dB, of the path over `profile`.
+/// Returns the diffraction loss of the path over `profile`, dB. It is the same in both directions.
 ///
-/// The antennas are at the heights `ends_m` above the sea, at the ends of the profile. The profile has at least two points,
-/// with increasing distances from 0 on. The loss is at least 0, and the same in both directions.
+/// `ends_m` are the heights of the two antennas above the sea, at the ends of the profile. The profile has at least two
+/// points, with increasing distances from 0 on. The loss is at least 0.
 pub fn loss_db(profile: &[Point], ends_m: [f64; 2], wavelength_m: f64) -> f64 {
     loss_over_db(profile, ends_m, wavelength_m, Surface::default())
 }
 
-/// Returns the diffraction loss, dB, above the given ground. See [`loss_db`].
+/// Returns the diffraction loss, dB, for the ground `surface`. See [`loss_db`].
 pub fn loss_over_db(
     profile: &[Point],
     ends_m: [f64; 2],
@@ -80,8 +82,9 @@ pub fn knife_edge_db(v: f64) -> f64 {
     6.9 + 20.0 * ((over * over + 1.0).sqrt() + over).log10()
 }
 
-/// Returns the loss of the Bullington construction (one equivalent knife edge), dB. Ends and points are heights above
-/// the sea, m.
+/// Returns the loss of the Bullington construction (one knife edge), dB.
+///
+/// `from`, `to` and the points of the profile are heights above the sea, m.
 fn bullington_db(
     profile: impl Iterator<Item = Point> + Clone,
     length: f64,
@@ -91,7 +94,7 @@ fn bullington_db(
     let inner = profile.filter(|[d, _]| *d > 0.0 && *d < length);
     let raised = inner.map(|[d, height]| (d, height + d * (length - d) / (2.0 * EARTH_M)));
     let slope = (to - from) / length;
-    // Diffraction parameter of an edge at distance d, this much above the straight line between the antennas.
+    // Diffraction parameter of an edge at the distance d. `above` is its height above the line between the antennas.
     let parameter =
         |d: f64, above: f64| above * (2.0 * length / (wavelength * d * (length - d))).sqrt();
     let above = |d: f64, height: f64| height - (from + slope * d);
@@ -103,10 +106,10 @@ fn bullington_db(
     } else {
         let fall = raised.map(|(d, height)| (height - to) / (length - d));
         let fall = fall.fold(f64::NEG_INFINITY, f64::max);
-        // The horizons meet between the antennas; at an antenna only if the ground rises above it.
+        // The horizons meet between the antennas, or at an antenna that is below the ground.
         let meet = ((to - from + fall * length) / (rise + fall))
             .clamp(1e-6 * length, (1.0 - 1e-6) * length);
-        // Without a unique meeting point the ground just touches the line of sight.
+        // If the horizons have no single meeting point, the ground just touches the line of sight.
         if meet.is_nan() {
             0.0
         } else {
@@ -160,14 +163,14 @@ fn smooth_heights_m(profile: &[Point], [from, to]: [f64; 2]) -> [f64; 2] {
 
 /// Returns the diffraction loss of a smooth spherical earth, dB.
 ///
-/// The antennas are at these heights above it, m.
+/// `heights` are the heights of the antennas above this earth, m.
 fn spherical_db(length: f64, heights: [f64; 2], wavelength: f64, surface: Surface) -> f64 {
     let [h1, h2] = heights;
     let roots = h1.sqrt() + h2.sqrt();
     if length >= (2.0 * EARTH_M).sqrt() * roots {
         return first_term_db(length, heights, wavelength, EARTH_M, surface);
     }
-    // Place and height of the smallest clearance of the line of sight.
+    // Point at which the line of sight is closest to the earth, and its clearance there.
     let c = (h1 - h2) / (h1 + h2);
     let m = length * length / (4.0 * EARTH_M * (h1 + h2));
     let inner = 3.0 * c / 2.0 * (3.0 * m / (m + 1.0).powi(3)).sqrt();
@@ -182,7 +185,7 @@ fn spherical_db(length: f64, heights: [f64; 2], wavelength: f64, surface: Surfac
     if clearance > required {
         return 0.0;
     }
-    // Radius with which the line of sight just touches the earth.
+    // Earth radius at which the line of sight just touches the earth.
     let touching = 0.5 * (length / roots).powi(2);
     let loss = first_term_db(length, heights, wavelength, touching, surface);
     (1.0 - clearance / required) * loss.max(0.0)

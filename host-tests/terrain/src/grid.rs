@@ -5,11 +5,11 @@
 //! | `*.hgt` | SRTM tile of 1° with 1201, 3601 or 7201 heights per row, named by its south-west corner, such as `N47E008.hgt` |
 //! | GeoTIFF | one band; latitude and longitude (EPSG 4326 or 4258) or UTM (EPSG 326zz, 327zz or 258zz), north up; heights in metres |
 //!
-//! All files are parts of one grid: they have the same coordinate system and cells, and their cells are aligned. A height between four
-//! heights of the grid is interpolated bilinearly. The four may be in different files. Files may overlap if their heights differ by at
-//! most 1 m where both have one; then the first of them counts.
+//! All files are parts of one grid: they have the same coordinate system, equal cells, and aligned cells. Between four
+//! grid points the height is interpolated bilinearly. The four points may be in different files. Files may overlap if
+//! their heights differ by at most 1 m; the first file then counts.
 //!
-//! The vertical datum is not converted: heights are taken as heights above the mean sea level.
+//! The vertical datum is not converted: all heights count as heights above the mean sea level.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -18,16 +18,16 @@ use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
-/// Range of valid heights of the earth's surface, m. Other values in an elevation file mark holes.
+/// Range of valid heights of the ground, m. Other values in an elevation file mean that the height is unknown.
 const HEIGHTS: std::ops::RangeInclusive<f64> = -500.0..=9000.0;
 
-/// Largest relative difference of two files' cell sizes with which they still belong to one grid.
+/// Largest relative difference of cell size between two files of one grid.
 const SAME_CELL: f64 = 1e-6;
 
-/// Largest distance of a file's grid points from those of the common grid, as a fraction of a cell.
+/// Largest offset between the grid points of two files, as a fraction of a cell.
 const ALIGNED: f64 = 0.02;
 
-/// Largest difference of the heights of two files that overlap, m.
+/// Largest difference of height between two overlapping files, m.
 const SAME_M: f64 = 1.0;
 
 /// EPSG codes of vertical coordinate systems in feet.
@@ -74,13 +74,13 @@ impl System {
         }
     }
 
-    /// Returns the coordinates of a point in this system: to the east, then to the north.
+    /// Returns the coordinates of a point in this system: east, then north.
     fn coordinates(self, lat_deg: f64, lon_deg: f64) -> [f64; 2] {
         let Self::Utm { zone, south } = self else {
             return [lon_deg, lat_deg];
         };
         let (north, east, _) = utm::to_utm_wgs84(lat_deg, lon_deg, zone);
-        // The crate adds 10 000 km at and south of the equator.
+        // The crate `utm` adds 10 000 km at the equator and south of it.
         let equator = if lat_deg > 0.0 { 0.0 } else { 1e7 };
         [east, north - equator + if south { 1e7 } else { 0.0 }]
     }
@@ -101,23 +101,23 @@ impl std::fmt::Display for System {
 struct Tile {
     file: String,
     system: System,
-    /// Size of a cell, in the units of the coordinate system: to the east and to the south.
+    /// Size of a cell, east and south, in the units of the coordinate system.
     cell: [f64; 2],
-    /// Coordinates of the tile's north-west grid point, east then north.
+    /// Coordinates, east then north, of the tile's north-west grid point.
     corner: [f64; 2],
     /// Column and row of the tile's north-west grid point in the whole grid.
     at: [i64; 2],
     columns: usize,
     rows: usize,
-    /// Heights in rows from north to south, m.
+    /// Heights, m, row by row from north to south.
     heights: Vec<f32>,
     nodata: Option<f32>,
 }
 
-/// Height at one node (point) of the terrain grid, or the reason why it is unknown.
+/// Height at one grid point, or the reason why it is unknown.
 enum Node<'a> {
     Height(f64),
-    /// No height: at this node the file has an invalid value. The fields are the file and the value.
+    /// The file has an invalid value at this point. The fields are the file and the value.
     Hole(&'a Tile, f32),
     Outside,
 }
@@ -135,7 +135,7 @@ impl Terrain {
     /// Reads the elevation model in `files`, at least one.
     ///
     /// # Errors
-    /// A line that names the file and the problem: an unreadable or unsupported file, or files of different grids.
+    /// A text that names the file and the problem: an unreadable or unsupported file, or files of different grids.
     pub fn load(files: &[impl AsRef<Path>]) -> Result<Self, String> {
         let tiles = files.iter().map(|file| Tile::load(file.as_ref()));
         let mut tiles = tiles.collect::<Result<Vec<_>, _>>()?;
@@ -177,13 +177,13 @@ impl Terrain {
     /// Returns the height of the ground at a point, m above the mean sea level.
     ///
     /// # Errors
-    /// A line that names the point and the file: no file covers the point, or the file has a hole there.
+    /// A text that names the point and the file: no file covers the point, or the file has a hole there.
     pub fn height_m(&self, lat_deg: f64, lon_deg: f64) -> Result<f64, String> {
         let at = self.cells(lat_deg, lon_deg);
         interpolated(at, |node| self.node_m(node, lat_deg, lon_deg))
     }
 
-    /// Returns the column and the row of a point in the grid, with fractions. The grid has heights at whole numbers.
+    /// Returns the column and the row of a point in the grid. Whole numbers are grid points.
     pub fn cells(&self, lat_deg: f64, lon_deg: f64) -> [f64; 2] {
         let [east, north] = self.system.coordinates(lat_deg, lon_deg);
         [
@@ -192,7 +192,7 @@ impl Terrain {
         ]
     }
 
-    /// Returns the height at a column and a row of [`cells`](Self::cells), m; `None` outside and in a hole.
+    /// Returns the height at a column and row of [`cells`](Self::cells), m; `None` if it is unknown.
     pub fn height_at(&self, cells: [f64; 2]) -> Option<f64> {
         let known = |node| {
             let mut nodes = self.tiles.iter().map(|tile| tile.node(node));
@@ -245,12 +245,14 @@ impl Terrain {
     }
 }
 
-/// Returns the bilinear interpolation at a column and a row of the heights that `height` returns.
+/// Returns the bilinear interpolation of the grid's heights at a column and row.
+///
+/// `height` returns the height at a grid point.
 fn interpolated<E>(
     [column, row]: [f64; 2],
     height: impl Fn([i64; 2]) -> Result<f64, E>,
 ) -> Result<f64, E> {
-    // A point within rounding of a node needs no other nodes.
+    // A point at a grid point, apart from rounding, needs no other grid points.
     let split = |at: f64| {
         let whole = (at + 1e-6).floor();
         #[expect(
@@ -284,8 +286,9 @@ impl Tile {
         read.map_err(|problem| format!("{name}: {problem}"))
     }
 
-    /// Returns column and row of this tile's north-west grid point in the grid of another tile. The error names the property in which the
-    /// two grids differ.
+    /// Returns the column and row of this tile's north-west grid point in another grid.
+    ///
+    /// The error names the property in which the two grids differ.
     fn place_in(
         &self,
         system: System,
@@ -315,10 +318,10 @@ impl Tile {
         Ok(at)
     }
 
-    /// Checks that two files have about the same heights where both have one.
+    /// Checks that the heights of two overlapping files agree.
     ///
     /// # Errors
-    /// A line with the greatest difference: both files, the place and both heights.
+    /// A text with the greatest difference: both files, the place and both heights.
     fn agrees_with(&self, other: &Self) -> Result<(), String> {
         let range = |axis: usize, counts: [usize; 2]| {
             let from = [self, other].map(|tile| tile.at.get(axis).copied().unwrap_or_default());
@@ -407,7 +410,7 @@ impl Tile {
     }
 }
 
-/// Reads an SRTM tile. The name of its file states the position of the tile.
+/// Reads an SRTM tile. The file name states its position.
 fn srtm(path: &Path) -> Result<Tile, String> {
     let name = path
         .file_stem()
@@ -459,7 +462,6 @@ fn srtm_corner(name: &str) -> Option<[f64; 2]> {
     Some([lon, lat])
 }
 
-/// Reads a tile of terrain heights from a GeoTIFF file.
 fn geotiff(path: &Path) -> Result<Tile, String> {
     let said = |error: tiff::TiffError| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;
@@ -471,7 +473,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
     let keys = decoder.get_tag_u16_vec(Tag::GeoKeyDirectoryTag);
     let keys = keys.map_err(|_| "has no GeoTIFF keys, so its coordinate system is unknown")?;
     let key = |id: u16| {
-        // A key whose value is in the directory itself.
+        // The value is in the GeoTIFF directory itself.
         let mut entries = keys.chunks_exact(4).skip(1);
         entries.find_map(|entry| match entry {
             [key, 0, 1, value] if *key == id => Some(*value),
@@ -494,7 +496,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
                 "has heights in feet: its vertical coordinate system is EPSG {code} (key 4096); allowed: heights in metres above the mean sea level"
             ));
         }
-        // Codes of the first version of GeoTIFF.
+        // Codes of GeoTIFF 1.0.
         Some(code @ (4979 | 5001..=5033)) => {
             return Err(format!(
                 "has heights above the ellipsoid: its vertical coordinate system has the code {code} (key 4096); allowed: heights in metres above the mean sea level"
@@ -540,7 +542,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
             "has {columns} x {rows} heights with cells of {width} x {height}; allowed: 2 x 2 or more, with cells above 0"
         ));
     }
-    // By default a tie point is at the corner of a cell, and the cell's height at its middle.
+    // By default a tie point is a corner of a cell, and the height belongs to the middle of the cell.
     let middle = if key(1025) == Some(2) { 0.0 } else { 0.5 };
     let nodata = decoder.get_tag_ascii_string(Tag::GdalNodata).ok();
     let nodata = nodata.and_then(|text| text.trim_matches(['\0', ' ']).parse::<f32>().ok());
@@ -564,7 +566,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
     })
 }
 
-/// Returns the value of the item `role` of GDAL's metadata; `None` without such an item.
+/// Returns the value of GDAL's metadata item with the role `role`; `None` if there is none.
 fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
     let mut after = ['"', '\'']
         .into_iter()
@@ -574,6 +576,8 @@ fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
 }
 
 /// Returns true if `value` is the scale 1, the offset 0 or the unit metre.
+///
+/// The heights are then in metres.
 fn is_metres(value: &str) -> bool {
     let is_number = [1.0, 0.0].map(Ok).contains(&value.parse::<f64>());
     is_number || ["m", "metre", "meter"].contains(&value.to_lowercase().as_str())

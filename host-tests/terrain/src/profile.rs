@@ -1,16 +1,17 @@
 //! Profiles: the ground below each hop of a chain, and the clearance of the line of sight.
 //!
-//! A hop runs straight, seen from above. Its profile has a height at every quarter of a cell of the elevation model, and where the hop
-//! crosses a column or a row of the model. Between these crossings the ground, interpolated bilinearly, is a parabola. The profile also
-//! has the highest point of each parabola, and the point of the least clearance. The highest ground of a profile is therefore exact.
+//! A hop is a straight line, seen from above. Its profile has a point at every quarter of a cell of the elevation
+//! model, and at each crossing with a column or row of the model. Between two points the interpolated ground is a
+//! parabola. Its highest point is in the profile, too, and the point closest to the line of sight. The highest ground
+//! of a profile is therefore exact.
 //!
-//! Along the hop the earth rises by d1 d2 / 2a between its ends, with the distances d1 and d2 from the ends and the effective radius a.
+//! At the distances d1 and d2 from the ends of a hop, the earth rises by d1 d2 / 2a; a is the effective earth radius.
 //!
 //! | state of a hop | condition |
 //! | --- | --- |
 //! | clear | the ground is below the line of sight by at least 60 % of the radius of the first Fresnel zone |
 //! | grazing | the ground is inside this part of the zone, but below the line of sight |
-//! | blocked | the ground is above the line of sight somewhere, or above a relay |
+//! | blocked | the ground is above the line of sight at some point, or above an antenna |
 
 use serde::Serialize;
 use uav_relay::flight::axis::Axis;
@@ -19,7 +20,7 @@ use uav_relay::{Geodetic, Placement};
 use crate::diffraction::{EARTH_M, Point};
 use crate::grid::Terrain;
 
-/// Fraction of the radius of the first Fresnel zone that a clear hop keeps free of the ground.
+/// Fraction of the first Fresnel zone's radius that must be free of ground on a clear hop.
 pub const FREE: f64 = 0.6;
 
 /// Largest number of equal steps of a profile.
@@ -28,22 +29,24 @@ const MOST_STEPS: f64 = 20_000.0;
 /// Least number of equal steps of a profile.
 const LEAST_STEPS: f64 = 16.0;
 
-/// Least distance of two points of a profile, m.
+/// Smallest distance between two points of a profile, m.
 const APART_M: f64 = 1e-3;
 
-/// Least height, m, by which the vertex of a parabola differs from its ends to be a point of a profile.
+/// Smallest height difference between a parabola's vertex and its ends, m.
+///
+/// A vertex with a smaller difference is no profile point.
 const VERTEX_M: f64 = 1e-3;
 
-/// Side of the squares in which columns and rows are linear functions of x and y, m.
+/// Side of a square in which column and row of the elevation model are taken as linear in x and y, m.
 const SQUARE_M: f64 = 200.0;
 
-/// Largest accepted difference of a site's heights in scenario and elevation model, m.
+/// Largest accepted difference between a site's height in the scenario and in the elevation model, m.
 pub const SITE_ERROR_M: f64 = 15.0;
 
-/// Distance from Tx or Rx at which the assumed error of the heights reaches its full value, m.
+/// Distance from Tx or Rx, m, at which the assumed error of the heights reaches its full value.
 const GROWTH_M: f64 = 100.0;
 
-/// Terrain along the line from Tx to Rx.
+/// Terrain around the line from Tx to Rx.
 #[derive(Clone, Copy)]
 #[expect(missing_debug_implementations, reason = "millions of heights")]
 pub struct Ground<'a> {
@@ -59,9 +62,9 @@ pub struct Ground<'a> {
 /// Antenna of a chain: Tx, a relay or Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Node {
-    /// Distance from Tx along the line to Rx, m.
+    /// Distance from Tx toward Rx, m.
     pub x_m: f64,
-    /// Lateral position of the antenna, m; positive to the right of the line.
+    /// Lateral position of the antenna, m; positive to the right as seen from Tx toward Rx.
     pub y_m: f64,
     /// Height of the antenna above the mean sea level, m.
     pub amsl_m: f64,
@@ -72,7 +75,7 @@ pub struct Node {
 pub struct Profile {
     /// Antennas of the hop, the antenna nearer to Tx first.
     pub nodes: [Node; 2],
-    /// Distances from the first antenna, increasing from 0, and heights of the ground, m.
+    /// Points of the ground: distance from the first antenna, increasing from 0, and height, m.
     pub points: Vec<Point>,
 }
 
@@ -80,11 +83,11 @@ pub struct Profile {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
-    /// The first Fresnel zone is free of the ground.
+    /// Hop whose line of sight is above the ground by 60 % of the first Fresnel zone's radius or more.
     Clear,
-    /// The ground is in the first Fresnel zone, below the line of sight.
+    /// Hop whose line of sight is above the ground, but by less than a clear hop needs.
     Grazing,
-    /// The ground is above the line of sight.
+    /// Hop whose line of sight is interrupted by the ground.
     Blocked,
 }
 
@@ -102,12 +105,12 @@ pub struct Clearance {
 }
 
 impl<'a> Ground<'a> {
-    /// Creates the terrain along `axis`, the line between the sites Tx and Rx.
+    /// Creates the terrain along `axis`, the line from the site Tx to the site Rx.
     ///
     /// The antennas of Tx and Rx are `mast_m` above the ground.
     ///
     /// # Errors
-    /// A line that names the site and the heights: the terrain does not cover a site, or contradicts its height.
+    /// A text that names the site and the heights: the terrain does not cover the site, or contradicts its height.
     pub fn new(
         terrain: &'a Terrain,
         axis: Axis,
@@ -142,30 +145,32 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the terrain with an assumed error of its heights: the ground counts as higher by `error_m`.
+    /// Returns the terrain with `error_m` as the assumed error of its heights. The ground counts as higher by it.
     ///
-    /// The error is 0 at Tx and at Rx, because their antennas stand on the same ground. Within 100 m from Tx or Rx it grows to `error_m`.
+    /// The error is 0 at Tx and Rx, because their antennas stand on the same ground. It grows to `error_m` within 100 m
+    /// from them.
     #[must_use]
     pub const fn with_error_m(self, error_m: f64) -> Self {
         Self { error_m, ..self }
     }
 
-    /// Returns the assumed error of the terrain's heights at `x_m` along the line, m. The ground counts as higher by this amount. The
-    /// amount is 0 at Tx and Rx, and has its full value 100 m away from them.
+    /// Returns the assumed error of the heights at `x_m`, m. The ground counts as higher by it.
+    ///
+    /// It is 0 at Tx and Rx, and has its full value 100 m away from them.
     pub fn raise_m(&self, x_m: f64) -> f64 {
         let from_site_m = x_m.min(self.axis.distance_m() - x_m);
         self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)
     }
 
-    /// Returns the largest distance of two points of a profile, m. It is a quarter of a cell of the elevation model.
+    /// Returns the largest distance between two points of a profile, m: a quarter of a cell.
     pub const fn step_m(&self) -> f64 {
         self.step_m
     }
 
-    /// Returns a relay's antenna.
+    /// Returns the antenna of a relay at `place`.
     ///
     /// # Errors
-    /// A line that names the position, if it is too far from the line.
+    /// A text that names the position, if it is too far from the line Tx-Rx.
     pub fn relay(&self, place: Placement) -> Result<Node, String> {
         let point = self.axis.point(place).ok_or_else(|| self.too_far(place))?;
         Ok(Node {
@@ -175,11 +180,12 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the point at `x_m` along the line and `y_m` beside it, at altitude 0. Altitude 0 is the straight line from the ground at Tx
-    /// to the ground at Rx.
+    /// Returns the point at `x_m`, `y_m` and altitude 0.
+    ///
+    /// Altitude 0 is the straight line from the ground at Tx to the ground at Rx.
     ///
     /// # Errors
-    /// A line that names the position, if it is too far from the line.
+    /// A text that names the position, if it is too far from the line Tx-Rx.
     #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
     pub fn point(&self, x_m: f64, y_m: f64) -> Result<Geodetic, String> {
         let place = Placement {
@@ -203,28 +209,27 @@ impl<'a> Ground<'a> {
         )
     }
 
-    /// Returns the height of the ground above the mean sea level, m.
-    ///
-    /// The position is `x_m` along the line and `y_m` beside it.
+    /// Returns the height of the ground at `x_m`, `y_m`, m above the mean sea level.
     ///
     /// # Errors
-    /// A line that names the position: the elevation files do not cover it, or have no height there.
+    /// A text that names the position: the elevation files do not cover it, or have no height there.
     pub fn height_m(&self, x_m: f64, y_m: f64) -> Result<f64, String> {
         let there = |error| format!("x = {x_m:.1} m, y = {y_m:.1} m: {error}");
         height_at(self.terrain, self.point(x_m, y_m)?).map_err(there)
     }
 
-    /// Returns the highest ground within `radius_m` of a position, m above the mean sea level.
+    /// Returns the highest ground within `radius_m` of `node`, m above the mean sea level.
     ///
-    /// In a cell the ground has no highest point: that of a circle is at a node of the elevation model, or at the edge.
+    /// It includes the assumed error of the heights.
     ///
     /// # Errors
-    /// A line that names a position: the elevation files do not cover it, or have no height there.
+    /// A text that names a position: the elevation files do not cover it, or have no height there.
     pub fn highest_m(&self, node: Node, radius_m: f64) -> Result<f64, String> {
         let raise_m = self.raise_m(node.x_m);
         let mut highest = self.height_m(node.x_m, node.y_m)?;
         if radius_m > 0.0 {
-            // A polygon around the circle, by at most a centimetre.
+            // A polygon outside of the circle by at most a centimetre. Inside a cell the ground has no highest point.
+            // So the highest point of the polygon is on an edge or at a node.
             let corners = (std::f64::consts::PI * (50.0 * radius_m).sqrt())
                 .ceil()
                 .max(16.0);
@@ -249,9 +254,10 @@ impl<'a> Ground<'a> {
         Ok(highest + raise_m)
     }
 
-    /// Returns the ground along the straight line between two positions [x, y].
+    /// Returns points of the ground along the straight line between two positions [x, y].
     ///
-    /// The points have the distance from the first position and the height, m. Their highest and lowest heights are those of the ground along the whole line. They are not raised.
+    /// Each point has the distance from the first position and the height, m. The highest and the lowest ground of the
+    /// line are among the points. The assumed error of the heights is not added.
     ///
     /// # Errors
     /// Those of [`height_m`](Self::height_m).
@@ -268,13 +274,13 @@ impl<'a> Ground<'a> {
         flat.along(ends, 1.0)
     }
 
-    /// Returns the nodes of the elevation model in a rectangle, as [x, y, height], m. The heights are not raised.
+    /// Returns the nodes of the elevation model in a rectangle, as [x, y, height], m.
     ///
-    /// `low` and `high` are its corners with the least and greatest x and y. Nodes for which `is_in` is false are left
-    /// out.
+    /// `low` has the least x and y of the rectangle, and `high` the greatest. Nodes are left out if `is_in` returns
+    /// false. The assumed error of the heights is not added.
     ///
     /// # Errors
-    /// A line that names such a node without a height.
+    /// A text that names a node without a height.
     pub fn nodes(
         &self,
         [low, high]: [[f64; 2]; 2],
@@ -297,7 +303,7 @@ impl<'a> Ground<'a> {
         Ok(nodes)
     }
 
-    /// Adds the nodes of a small rectangle to `nodes`.
+    /// Adds the elevation model's nodes in a small rectangle to `nodes`.
     fn nodes_of(
         &self,
         [x, y]: [f64; 2],
@@ -325,7 +331,7 @@ impl<'a> Ground<'a> {
                 let [right, down] = [column - origin[0], row - origin[1]];
                 let u = (right * d - down * b) / surface;
                 let v = (down * a - right * c) / surface;
-                // A little more than the rectangle: a node at its edge is in it.
+                // The limits are wider than the rectangle by 1 cm, so that nodes at its edge are inside.
                 let is_within = |at: f64, side: f64| at >= -0.01 && at <= side + 0.01;
                 let place = [x + u, y + v];
                 if is_within(u, wide) && is_within(v, high) && is_in(place) {
@@ -339,16 +345,15 @@ impl<'a> Ground<'a> {
         Ok(())
     }
 
-    /// Returns the height at a column and a row, which are at `place` [x, y].
+    /// Returns the height at the column and row `cells`. They belong to the position [x, y].
     fn height_of(&self, cells: [f64; 2], [x_m, y_m]: [f64; 2]) -> Result<f64, String> {
         let known = self.terrain.height_at(cells);
         known.map_or_else(|| self.height_m(x_m, y_m), Ok)
     }
 
-    /// Returns the column and the row of the point `place` [x, y].
+    /// Returns the column and row of the position [x, y].
     ///
-    /// Coordinates of points are rounded to 1e-7 degrees, 1 cm. `turn` is the [`turn`](Self::turn) near the point, to
-    /// correct that.
+    /// Positions are rounded to 1e-7 degrees, about 1 cm. The result of [`turn`](Self::turn) corrects this.
     fn cells(&self, [x, y]: [f64; 2], [[a, b], [c, d]]: [[f64; 2]; 2]) -> Result<[f64; 2], String> {
         let point = self.point(x, y)?;
         let (lat, lon) = (f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7);
@@ -360,7 +365,7 @@ impl<'a> Ground<'a> {
         Ok([column + a * u + b * v, row + c * u + d * v])
     }
 
-    /// Returns the change of column and row for 1 m of x and y, near a position.
+    /// Returns the change of column and row per metre of x and of y, near a position.
     fn turn(&self, [x, y]: [f64; 2]) -> Result<[[f64; 2]; 2], String> {
         let far_m = 0.5 * SQUARE_M;
         let around_m = f64::from(Axis::AROUND_M);
@@ -369,7 +374,7 @@ impl<'a> Ground<'a> {
             [self.axis.distance_m() + around_m, around_m],
         );
         let between = |off: [f64; 2]| {
-            // Points exist only near the line.
+            // Positions exist only near the line Tx-Rx.
             let ends = [-far_m, far_m].map(|far_m| {
                 [
                     (x + far_m * off[0]).clamp(least[0], most[0]),
@@ -389,7 +394,7 @@ impl<'a> Ground<'a> {
     /// Returns the profile of the hop between two antennas.
     ///
     /// # Errors
-    /// A line that names a position: the elevation files do not cover it, or have no height there.
+    /// A text that names a position: the elevation files do not cover it, or have no height there.
     pub fn profile(&self, nodes: [Node; 2]) -> Result<Profile, String> {
         Ok(Profile {
             nodes,
@@ -397,7 +402,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the points of a profile, raised by the error of the heights.
+    /// Returns the points of a profile. Their heights include the assumed error.
     fn along(&self, [from, to]: [Node; 2], least_steps: f64) -> Result<Vec<Point>, String> {
         let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);
         let length = dx.hypot(dy);
@@ -412,7 +417,7 @@ impl<'a> Ground<'a> {
         let share = |step: u32| f64::from(step) / f64::from(steps);
         let each = (0..=steps).map(|step| Ok((share(step), self.cells(place(share(step)), turn)?)));
         let each = each.collect::<Result<Vec<_>, String>>()?;
-        // Shares and cells of the steps and of the crossings of columns and rows between them.
+        // Fractions of the length, and cells, of all steps and of the crossings with columns and rows.
         let mut at = Vec::with_capacity(2 * each.len());
         let mut inner = Vec::new();
         for ((start, a), (end, b)) in each.iter().zip(each.iter().skip(1)) {
@@ -476,7 +481,7 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Returns the equal steps of at most `step_m` that make up a length, and their number.
+/// Divides a length into equal steps of at most `step_m`. Returns the step and the number of steps.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -491,16 +496,16 @@ const fn mixed(from: f64, to: f64, share: f64) -> f64 {
     from + share * (to - from)
 }
 
-/// Returns the value at `share` of the parabola with these values at 0, 1/2 and 1.
+/// Returns the value at `share` of the parabola through three values at 0, 1/2 and 1.
 fn parabola([start, middle, end]: [f64; 3], share: f64) -> f64 {
     let slope = 4.0 * middle - 3.0 * start - end;
     let bend = 2.0 * (start + end) - 4.0 * middle;
     start + share * (slope + share * bend)
 }
 
-/// Returns the place of the extremum of the parabola with these values at 0, 1/2 and 1.
+/// Returns the extremum, a number from 0 to 1, of the parabola through three values at 0, 1/2 and 1.
 ///
-/// `None` if it is not between 0 and 1, or differs by less than a millimetre from a value there.
+/// `None` if it is not between 0 and 1, or if its value is within a millimetre of the value at 0 or 1.
 fn vertex([start, middle, end]: [f64; 3]) -> Option<f64> {
     let slope = 4.0 * middle - 3.0 * start - end;
     let bend = 2.0 * (start + end) - 4.0 * middle;
@@ -513,7 +518,7 @@ fn height_at(terrain: &Terrain, point: Geodetic) -> Result<f64, String> {
     terrain.height_m(f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7)
 }
 
-/// Returns the height by which the earth rises above the straight line between the ends of a hop, m.
+/// Returns the height of the curved earth above the straight line between the ends of a hop, m.
 pub fn bulge_m(along_m: f64, length_m: f64) -> f64 {
     along_m * (length_m - along_m) / (2.0 * EARTH_M)
 }
@@ -559,7 +564,7 @@ impl Profile {
             }
         };
         let all = || self.points.iter().map(at);
-        // At an antenna the zone has no radius, so its margin is the height of the mast: it counts only if the antenna is below the ground.
+        // At an antenna the Fresnel zone has no radius, so its ends count only if the antenna is below the ground.
         let blocked = all().filter(|point| point.state == State::Blocked);
         let blocked = blocked.min_by(|a, b| a.clearance_m.total_cmp(&b.clearance_m));
         let margin = |point: &Clearance| point.clearance_m - point.required_m;

@@ -11,15 +11,15 @@ use crate::profile::{Ground, Node, Profile, State};
 /// Terrain below one hop.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct HopReport {
-    /// True if the first Fresnel zone of the hop is free of the ground by 60 % of its radius.
+    /// True if the ground is below the line of sight by 60 % of the first Fresnel zone's radius.
     pub clear: bool,
     /// State of the line of sight: `clear`, `grazing` or `blocked`.
     pub state: State,
     /// Height of the line of sight above the worst obstacle, m; below 0 if the hop is blocked.
     pub clearance_m: f64,
-    /// Clearance that a clear hop has above this obstacle, m.
+    /// Clearance that a clear hop needs at this obstacle, m.
     pub required_m: f64,
-    /// Distance of the obstacle from Tx along the line to Rx, m.
+    /// Distance of the obstacle from Tx toward Rx, m.
     pub obstacle_x_m: f64,
     /// Lateral position of the worst obstacle, m.
     pub obstacle_y_m: f64,
@@ -29,9 +29,11 @@ pub struct HopReport {
     pub obstacle_lon_deg: f64,
     /// Diffraction loss of the hop by Recommendation ITU-R P.526, dB; the same in both directions.
     pub diffraction_db: f64,
-    /// SIR of the hop in the direction to Rx, dB, with this loss. The signals of the interferers have no such loss.
+    /// SIR of the hop in the direction to Rx with its diffraction loss, dB.
+    ///
+    /// The interference is computed without such a loss.
     pub sir_db: f64,
-    /// SIR of the hop in the direction to Tx, dB, with this loss; absent if it is unknown.
+    /// SIR of the hop in the direction to Tx with its diffraction loss, dB; absent if it is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back_db: Option<f64>,
 }
@@ -54,9 +56,9 @@ pub struct RelayHeight {
 pub struct InterfererHeight {
     /// Number of the interferer in the scenario file, from 1.
     pub index: usize,
-    /// Least and greatest altitude of its antenna above the straight line between the sites, m.
+    /// Least and greatest altitude of the interferer's antenna above the straight line Tx-Rx, m.
     ///
-    /// Absent if the elevation files do not cover the interferer. The two values differ if the interferer's position is an area.
+    /// Absent if the elevation files do not cover the interferer. The two values differ if its position is an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub altitude_m: Option<[f64; 2]>,
 }
@@ -68,10 +70,10 @@ pub struct TerrainReport {
     pub hops: Vec<HopReport>,
     /// Heights of the relays above the terrain, from Tx to Rx.
     pub heights: Vec<RelayHeight>,
-    /// Altitudes of the interferers, with which the SIRs of the hops are computed.
+    /// Altitudes of the interferers that the SIRs of the hops are computed with.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub interferers: Vec<InterfererHeight>,
-    /// Position error within which obstacles below a relay count, m.
+    /// Position error of the relays, m. Obstacles within it count as below the relay.
     pub position_error_m: f64,
     /// SIR of the worst hop with the diffraction losses, linear. The plan's `sir` is without these losses.
     pub terrain_sir: f64,
@@ -82,7 +84,7 @@ pub struct TerrainReport {
     pub profiles: Vec<Profile>,
 }
 
-/// SIRs of a chain in free space, linear, by hop from Tx to Rx.
+/// Linear SIRs of the hops in free space, without diffraction losses.
 #[derive(Clone, Copy, Debug)]
 pub struct FreeSpace<'a> {
     /// SIRs of the hops in the direction to Rx, linear.
@@ -97,7 +99,7 @@ impl TerrainReport {
     /// Creates the report of a chain with relays at `places`.
     ///
     /// # Errors
-    /// A line that names the position: the elevation files do not cover it, or have no height there.
+    /// A text that names the position: the elevation files do not cover it, or have no height there.
     pub fn new(
         ground: &Ground<'_>,
         places: &[Placement],
@@ -163,7 +165,7 @@ impl TerrainReport {
         })
     }
 
-    /// Returns one line that names every blocked hop with its worst obstacle; `None` if no hop is blocked.
+    /// Returns a text that names every blocked hop with its worst obstacle; `None` if no hop is blocked.
     pub fn blocked(&self) -> Option<String> {
         let blocked = self
             .hops
@@ -185,7 +187,7 @@ impl TerrainReport {
         (!lines.is_empty()).then(|| lines.join("; "))
     }
 
-    /// Returns a line that names the relays lower than `least_m` above the highest ground.
+    /// Returns a text that names the relays less than `least_m` above the highest ground.
     ///
     /// `None` if no relay is too low.
     pub fn too_low(&self, least_m: f64) -> Option<String> {
@@ -201,7 +203,7 @@ impl TerrainReport {
         })
     }
 
-    /// Returns a line that names the relays higher than `most_m` above the ground.
+    /// Returns a text that names the relays more than `most_m` above the ground.
     ///
     /// `None` if no relay is too high.
     pub fn too_high(&self, most_m: f64) -> Option<String> {
@@ -220,7 +222,7 @@ impl TerrainReport {
         })
     }
 
-    /// Returns the name of a hop, from 0, with its two ends.
+    /// Returns the name of a hop with its two ends. Hops are counted from 0.
     fn name(&self, hop: usize) -> String {
         let node = |at: usize| match at {
             0 => "Tx".to_owned(),

@@ -1,8 +1,8 @@
-//! Room of each relay along the line: an interval of x in which its hops stay as clear as they are.
+//! Room of each relay: an interval of x. If all relays stay in their rooms, no hop becomes less clear.
 //!
-//! A hop between two intervals is checked at once, for all positions in them. The line of sight above a point of the ground is lowest
-//! at the ends of the intervals, because it is monotone in either position. The earth's curvature and the Fresnel zone are
-//! largest for the longest hop.
+//! A hop between two rooms is checked for all positions in them at once. The line of sight above a point of the ground
+//! is lowest with both antennas at an end of their rooms, because it is monotone in either position. The earth's
+//! curvature and the Fresnel zone are largest for the longest hop.
 
 use uav_relay::Placement;
 
@@ -13,45 +13,47 @@ use crate::report::TerrainReport;
 /// Limits on the positions of relays, m.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Error of a relay's position in every direction.
+    /// Largest error of a relay's position in every direction.
     pub position_error_m: f64,
     /// Least and greatest height above the ground.
     pub above_ground_m: [f64; 2],
-    /// Least distance between the intervals of two relays.
+    /// Least distance between the rooms of two neighbours.
     pub apart_m: f64,
     /// Wavelength of the carrier.
     pub wavelength_m: f64,
 }
 
-/// Node of the chain: the interval of its x, and its altitude above the datum, m. The datum is the straight line from the ground at Tx to
-/// the ground at Rx.
+/// Node of the chain: its interval of x, m, and its altitude above the datum, m.
+///
+/// The datum is the straight line from the ground at Tx to the ground at Rx.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     x_m: [f64; 2],
     h_m: f64,
 }
 
-/// Highest and lowest ground along the line, as points of x and height above the datum, m.
+/// Highest and lowest ground along the line Tx-Rx: points of x, m, and height above the datum, m.
 ///
-/// Between the points the ground is no higher and no lower than at them.
+/// Between two points the ground is no higher and no lower than at the points.
 struct Ridge {
-    /// Largest distance of two points.
+    /// Largest distance between two points.
     step_m: f64,
-    /// Highest ground within the position error, raised by the error of the heights.
+    /// Highest ground within the position error, plus the assumed error of the heights.
     highest: Vec<[f64; 2]>,
-    /// Lowest ground below the relays, which are up to `off_m` beside the line.
+    /// Lowest ground at most `off_m` beside the line Tx-Rx.
     lowest: Vec<[f64; 2]>,
 }
 
 impl Ridge {
-    /// Samples the ground. The relays are up to `off_m` beside the line, with a position error of up to `error_m`. Also returns the
-    /// altitudes of the antennas of Tx and Rx above the datum, m.
+    /// Samples the ground, and returns the altitudes of Tx and Rx above the datum, m.
+    ///
+    /// Relays are at most `off_m` beside the line Tx-Rx, with a position error of at most `error_m`.
     fn new(ground: &Ground<'_>, [off_m, error_m]: [f64; 2]) -> Result<(Self, [f64; 2]), String> {
         let [tx, rx] = ground.ends;
         let datum = |x_m: f64| Ok::<_, String>(f64::from(ground.point(x_m, 0.0)?.amsl_mm) / 1e3);
         let length = rx.x_m;
         let (step_m, steps) = steps(length, ground.step_m());
-        // Points of the ground: in a cell the highest and the lowest one of a strip are at its edges, or at nodes of the elevation model.
+        // In a cell, the highest and lowest points of a strip are at its edges or at nodes of the elevation model.
         let strip = |wide_m: f64, higher: fn(f64, f64) -> f64| {
             let mut points = Vec::new();
             for y_m in [-wide_m, wide_m] {
@@ -88,14 +90,16 @@ impl Ridge {
         ))
     }
 
-    /// Returns the points from `from_m` to `to_m`.
+    /// Returns the points with x from `from_m` to `to_m`.
     fn between(points: &[[f64; 2]], [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
         let first = points.partition_point(|[x_m, _]| *x_m < from_m);
         let points = points.iter().skip(first).copied();
         points.take_while(move |[x_m, _]| *x_m <= to_m)
     }
 
-    /// Returns true if `share` of the first Fresnel zone of every hop between the two intervals is free.
+    /// Returns true if every hop between the two intervals is clear: the ground is below its Fresnel zone.
+    ///
+    /// `share` is the fraction of the zone's radius that counts.
     fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
         let ([a, b], [c, d]) = (from.x_m, to.x_m);
         Self::between(&self.highest, [a, d]).all(|[x, height]| {
@@ -119,13 +123,13 @@ fn steps(length_m: f64, step_m: f64) -> (f64, u32) {
     (step, steps.max(1))
 }
 
-/// Returns the interval of x, m, in which each relay's hops stay as clear as they are in `report`.
+/// Returns the room of each relay: the x, m, at which its hops stay as clear as in `report`.
 ///
-/// This holds while all relays are in their intervals, within the position error. Each relay also keeps its height above the ground. `None`
-/// for a relay without such an interval around its position.
+/// This holds while all relays are in their rooms, within the position error. A relay in its room also keeps its limits
+/// of height above the ground. `None` for a relay without a room around its position.
 ///
 /// # Errors
-/// A line that names the position: the elevation files do not cover it, or have no height there.
+/// A text that names the position: the elevation files do not cover it, or have no height there.
 pub fn rooms(
     ground: &Ground<'_>,
     places: &[Placement],
@@ -160,7 +164,7 @@ pub fn rooms(
         ends.is_some_and(|(from, to)| ridge.is_free([*from, *to], share(hop), limits.wavelength_m))
     };
     let [least, most] = limits.above_ground_m;
-    // The least height counts within the position error, the greatest one above the ground straight below.
+    // The least height is checked within the position error, the greatest height straight below the relay.
     let is_in_band = |node: &Stretch, strip: [f64; 2], inner: [f64; 2]| {
         let h = node.h_m + error;
         let mut highest = Ridge::between(&ridge.highest, strip);
@@ -181,7 +185,7 @@ pub fn rooms(
                     continue;
                 };
                 let mut next = now;
-                // One point farther, so that the ground at the edge is between two points.
+                // One point beyond the edge, so that the ground at the edge is between two points.
                 let (strip, inward_m) = if side == 0 {
                     next.x_m[0] -= ridge.step_m;
                     ([next.x_m[0] - ridge.step_m, now.x_m[0]], error)
@@ -209,11 +213,11 @@ pub fn rooms(
         }
     }
     let rooms = nodes.iter().skip(1).zip(is_in);
-    // The position itself may be anywhere in the interval without its error.
+    // The room is smaller than the interval by the position error.
     Ok(rooms
         .map(|(node, is_in)| {
             let [from, to] = [node.x_m[0] + error, node.x_m[1] - error];
-            // Beside Tx or Rx the position error may lead beyond it.
+            // The interval ends at Tx or Rx, so that a relay near them may have no room.
             (is_in && from <= to).then_some([from, to])
         })
         .collect())

@@ -6,7 +6,7 @@
 //! | [`blind_places`] | maximise the weakest received signal, without interference |
 //! | [`equal_places`] | equal spacing |
 //!
-//! Each is scored in f64 by [`Scene`]: the SIR of the worst hop.
+//! [`Scene`] computes the SIR of the worst hop for each of them, in f64.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -28,10 +28,10 @@ pub struct Mean {
     pub rate: f64,
 }
 
-/// Returns the mean results of `draws` (at least 2) chains of randomly placed relays.
+/// Returns the mean results of `draws` (at least 2) chains with random positions.
 ///
-/// `seed` is the seed of the random positions. The cost for N relays: sorting N numbers and computing N + 1 SIRs for
-/// each of the chains.
+/// `seed` is the seed of the random positions. Cost for N relays: N numbers are sorted, and N + 1 SIRs computed, for
+/// each chain.
 pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut places = vec![0.0; scene.relays.len()];
@@ -60,22 +60,23 @@ pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
 
 // Interference-blind baseline: the chain that maximises the weakest received signal.
 //
-// The received power of a hop is p_t / (eta (d^2 + h^2)) from Tx, p_u / (mu_LoS d^2) between relays and p_u / (eta (d^2 + h^2))
-// to Rx. It falls with the hop length, so the best chain has the hop lengths at which all received powers are equal and the hops
-// just span the distance. With one relay this maximises min{p_t / (x^2 + h^2), p_u / ((D - x)^2 + h^2)}.
+// The received power of a hop is p_t / (eta (d^2 + h^2)) from Tx, p_u / (mu_LoS d^2) between relays and p_u / (eta (d^2
+// + h^2)) to Rx. It falls with the hop length. In the best chain all received powers are therefore equal, and the hops
+// together are as long as the distance. With one relay this maximises min{p_t / (x^2 + h^2), p_u / ((D - x)^2 + h^2)}.
 //
-// The outer hops are at least as long as the altitude. If the hops span more than the distance even then, many chains are
-// equally good; the one that shortens every hop in the same proportion is used.
+// The first and the last hop are at least as long as the altitude, which limits their power. With this power the hops
+// may together be longer than the distance. Many chains are then equally good; the one used shortens every hop by the
+// same factor.
 
-/// Largest number of bisection steps that find the received power that all hops have in common.
+/// Largest number of bisection steps for the received power that all hops share.
 ///
 /// Any f64 interval needs fewer steps.
 const HALVINGS: u32 = 200;
 
-/// Returns the relays' x, m from Tx, that maximise the weakest received signal. Interference is ignored.
+/// Returns the relays' x, m, that maximise the weakest received signal. Interference is ignored.
 ///
-/// All relays get the altitude and power of the first relay. Empty without relays. The cost is the cost of computing
-/// the length of a chain 200 times.
+/// All relays get the altitude and power of the first relay. Empty without relays. The cost is that of computing the
+/// length of a chain 200 times.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
         return Vec::new();
@@ -101,23 +102,24 @@ pub fn blind_places(scene: &Scene) -> Vec<f64> {
         .collect()
 }
 
-/// Computation of hop lengths, m, from the received power that each hop must have, W.
+/// Hop lengths, m, as a function of the received power, W.
 struct Hops<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
 }
 
 impl Hops<'_> {
-    /// Returns the largest signal power that is possible on both the first and the last hop, W.
+    /// Returns the largest signal power that the first and the last hop can both have, W.
     ///
-    /// On these hops, the received power is largest if the relay is right above Tx, or right above Rx.
+    /// A relay right above Tx, or right above Rx, has the largest power on its hop.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)
     }
 
-    /// Returns the horizontal length, m, of a hop from Tx or to Rx that receives `signal_w` watts. `power_w` is the
-    /// sender's power, W.
+    /// Returns the horizontal length of the first or last hop, m, if `signal_w` watts are received.
+    ///
+    /// `power_w` is the sender's power, W.
     fn outer(&self, power_w: f64, signal_w: f64) -> f64 {
         let height = self.relay.altitude_m;
         let squared = power_w / (self.scene.eta * signal_w) - height * height;
@@ -138,7 +140,7 @@ impl Hops<'_> {
     }
 }
 
-/// Returns equally spaced positions, m from Tx: relay k of N is at k / (N + 1) of the distance to Rx.
+/// Returns equally spaced x, m: relay k of N is at k / (N + 1) of the distance from Tx to Rx.
 pub fn equal_places(scene: &Scene) -> Vec<f64> {
     let hops = (scene.relays.len() + 1) as f64;
     (1..=scene.relays.len())

@@ -2,19 +2,20 @@
 //!
 //! | interference | profiles | method | accuracy |
 //! | --- | --- | --- | --- |
-//! | one interferer | any | reaches of a pass | exact if `proven`: no chain with one relay fewer meets the target |
-//! | a field | equal | ranges of equal relays | exact, also in an uneven field, which the paper leaves to an exhaustive search |
-//! | a field | different | reaches of a pass | result of Algorithm 4; not proven |
+//! | one interferer | any | farthest positions | exact if `proven`: no chain with one relay fewer meets the target |
+//! | a field | equal | ranges of equal relays | exact, also in an uneven field; the paper uses an exhaustive search there |
+//! | a field | different | farthest positions | result of Algorithm 4; not proven |
 //!
-//! A minimum separation can only raise the number. A number that is the same without it is proven, any other is not.
+//! A minimum separation can only raise the number. If the number is the same without it, it is proven; otherwise it is
+//! not.
 //!
-//! **Reaches of a pass:** the paper's eq. (Opt) and Problem 1. No chain gets farther than its reaches (see `optimiser::pass`), so n
-//! relays whose reaches do not end within the last hop cannot meet the target. The printed search starts with two relays; one may
-//! be enough.
+//! **Farthest positions:** the paper's eq. (Opt) and Problem 1. The reach of a relay is the farthest x that it can have
+//! (see `optimiser::pass`). If the reach of relay n is too far from Rx for the last hop, n relays cannot meet the
+//! target. The printed search starts with two relays; one may be enough.
 //!
-//! **Ranges of equal relays** in a field: the exact solution of the paper's Problem 1. Without a minimum separation, more equal
-//! relays never have a lower SIR. N of them meet a target if and only if the ranges of `optimiser::retreat` end at a position
-//! within the reach of the first hop.
+//! **Ranges of equal relays** in a field: the exact solution of the paper's Problem 1. Without a minimum separation,
+//! more equal relays never have a lower SIR. They meet a target if and only if the ranges of `optimiser::retreat` end
+//! at a position that the first hop can reach.
 
 use uav_relay::optimiser::pass::{Walk, origin};
 use uav_relay::root::{bisected, sqrt};
@@ -26,7 +27,7 @@ const MAX_RELAYS: u16 = Mission::MAX_RELAYS;
 /// Minimum number of relays for a target SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Fewest {
-    /// Number of relays with which a chain meets the target SIR.
+    /// Smallest number of relays that meets the target SIR.
     pub relays: u16,
     /// True if it is proven that no smaller number of relays meets the target.
     pub proven: bool,
@@ -35,27 +36,30 @@ pub struct Fewest {
 /// Highest target SIR that any number of relays meets, and the fewest relays that meet it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Most {
-    /// Highest target SIR that can be met, linear, with a relative error of 1e-6.
+    /// Highest target SIR that can be met, linear, to 1e-6 relative.
     pub target: f32,
-    /// Minimum number of relays with which the chain reaches `target`.
+    /// Smallest number of relays that meets `target`.
     pub relays: u16,
 }
 
 /// Lowest target SIR that [`Most::of`] tries, as a fraction of the first hop's highest possible SIR.
 const DEPTH: f32 = 1e-20;
 
-/// Number of bisection steps in [`Most::of`]. The search covers a range of 46 in ln(target), so the target is found
-/// to 1e-8 relative.
+/// Number of bisection steps in [`Most::of`].
+///
+/// The search covers a range of 46 in ln(target), so the target is found to 1e-8 relative.
 const HALVINGS: u8 = 32;
 
 impl Fewest {
-    /// Returns the minimum number of relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR above 0.
+    /// Returns the fewest relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`].
     ///
-    /// The mission's own number of relays is ignored. `profile_of` returns the profile of relay 1..=N. If the result is `proven`, it equals
-    /// an exhaustive count: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work with one interferer: a reach for each relay,
-    /// and two reaches with a minimum separation. Work in an interference field: at most 32 chains of equal relays.
+    /// `target` is linear, above 0. The mission's own number of relays is ignored. `profile_of` returns the profile of
+    /// relay 1..=N. `None` if no number of relays meets the target; [`Most::of`] returns the best target that they can
+    /// meet.
     ///
-    /// `None` if no number of relays meets the target; [`Most::of`] returns the best target that they can meet.
+    /// If the result is `proven`, it equals an exhaustive count: `as_few_as_an_exhaustive_count` in
+    /// `host-tests/tests/fleet/`. Work with one interferer: a reach (farthest x) for each relay, two with a minimum
+    /// separation. Work in an interference field: at most 32 chains of equal relays.
     pub fn of(mission: &Mission, target: f32, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let found = counted(mission, target, &profile_of)?;
         if !(mission.config().min_separation_m > 0.0) || !found.proven {
@@ -70,11 +74,10 @@ impl Fewest {
 }
 
 impl Most {
-    /// Returns the highest target SIR that any number of relays meets. `None` if it is below 1e-20 of the highest
-    /// possible SIR of the first hop.
+    /// Returns the highest target SIR that any number of relays meets.
     ///
-    /// With different altitudes, or a minimum separation, it is a feasible target but not certainly the highest. Work: 33 times
-    /// that of [`Fewest::of`].
+    /// `None` if it is below 1e-20 of the highest possible SIR of the first hop. With different altitudes, or a minimum
+    /// separation, the target can be met but may not be the highest. Work: 33 times that of [`Fewest::of`].
     pub fn of(mission: &Mission, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let meets = |target: f32| {
             let found = counted(mission, target, &profile_of)?;
@@ -100,10 +103,10 @@ impl Most {
     }
 }
 
-/// Returns positions with which the mission's N relays meet the SIR `target`, relay 1 first.
+/// Returns positions at which the mission's N relays meet the SIR `target`, relay 1 first.
 ///
-/// `None` if they do not meet it. All hops but one have their maximum length, and their SIR is `target` to 1e-4 relative. Work: at most two
-/// chains, each with a reach and a required position for every relay.
+/// `None` if they do not meet it. All hops but one have their maximum length, and their SIR is `target` to 1e-4
+/// relative. Work: at most two chains, each with a reach and a required position for every relay.
 pub fn places(
     mission: &Mission,
     target: f32,
@@ -122,8 +125,9 @@ fn unseparated(mission: &Mission) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// Returns the minimum number of relays that meet `target`; `None` if no number does. The result's `proven` is valid
-/// only for missions without a minimum separation.
+/// Returns the fewest relays that meet `target`; `None` if no number does.
+///
+/// Its `proven` is valid only for missions without a minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))
@@ -145,7 +149,7 @@ fn fewest_by_reaches(
 ) -> Option<Fewest> {
     match mission.heading() {
         Heading::TowardRx => toward_rx(mission, target, profile_of),
-        // Profiles are indexed from Tx, so every number of relays is another chain.
+        // Profiles are numbered from Tx, so each number of relays gives a different chain.
         Heading::TowardTx => (1..=MAX_RELAYS)
             .map_while(|relays| mission.with_relays(relays).ok())
             .find(|mission| is_met(&Walk::new(mission, target, false, profile_of)))
@@ -162,11 +166,11 @@ fn toward_rx(
     profile_of: &impl Fn(u16) -> Profile,
 ) -> Option<Fewest> {
     let mut from_m = 0.0;
-    // Reaches of both directions are not proven to exclude no chain.
+    // With both directions, the farthest positions do not prove that no other chain is possible.
     let mut proven = !(mission.reverse() > 0.0);
     for index in 1..=MAX_RELAYS {
         let mission = mission.with_relays(index).ok()?;
-        // The last relay of its chain may go to the very end.
+        // The last relay of its chain may go as far as Rx.
         let last = Walk::new(&mission, target, false, profile_of);
         let link = last.link(index);
         let before_m = from_m;
@@ -177,7 +181,7 @@ fn toward_rx(
         {
             continue;
         }
-        // If it leaves room for the relays behind it, a chain of known length may end earlier than one that grows.
+        // With a known number of relays, a relay may stop earlier to leave room for the relays behind it.
         if is_met(&last) {
             return Some(Fewest {
                 relays: index,
@@ -189,7 +193,7 @@ fn toward_rx(
     None
 }
 
-/// Computes the reach of every relay, and calls `visit` with its index and reach, m.
+/// Computes the reach (farthest x, m) of every relay, and calls `visit` with its index and reach.
 ///
 /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
 fn ends<F: Fn(u16) -> Profile>(
@@ -206,18 +210,20 @@ fn ends<F: Fn(u16) -> Profile>(
     is_complete.then(|| chain.link(at).ending(chain.target, before_m, reach))?
 }
 
-/// Returns true if the last hop meets the target when every relay is at its reach.
+/// Returns true if the last hop meets the target with every relay at its reach (farthest x).
 fn closes<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     ends(chain, |_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns true if the chain meets its target with relays at their reaches or required positions.
+/// Returns true if the relays can meet the target, at their reaches or at required positions.
 fn is_met<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     closes(chain) && (closes(&chain.plainly()) || chain.place(0).is_some())
 }
 
-/// Returns positions that meet the target; `None` if there are none. The function first computes each relay's reach, the farthest x at
-/// which its hop meets the target; then, from the last relay back, the x that the next hop requires.
+/// Returns positions that meet the target; `None` if there are none.
+///
+/// First the reach of each relay is computed: the farthest x at which its hop meets the target. Then, from the last
+/// relay back, the x that the next hop requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let mut places = vec![Placement::default(); usize::from(chain.mission.relays())];
@@ -239,7 +245,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>>
     Some(places)
 }
 
-/// Largest number of relays tried beyond the minimum, if the minimum separation makes the minimum fail.
+/// Largest number of further relays to try if a minimum separation makes the minimum number fail.
 const MORE: u16 = 32;
 
 const TARGETS: u8 = 48;
@@ -248,8 +254,10 @@ fn is_met_by_equals(mission: &Mission, target: f32, profile: Profile) -> bool {
     closes(&Walk::new(mission, target, false, &|_| profile))
 }
 
-/// Returns the minimum number of relays for `target` in an interference field; `None` if there is none. All relays
-/// have the same `profile`. Without a minimum separation the number is found by bisection; see [`Fewest::of`].
+/// Returns the fewest relays with the same `profile` that meet `target` in an interference field.
+///
+/// `None` if there is no such number. Without a minimum separation the number is found by bisection; see
+/// [`Fewest::of`].
 fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
     let met_by = |mission: &Mission, relays: u16| {
         mission
@@ -281,15 +289,16 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
         })
 }
 
-/// Returns the highest target SIR that N relays with the same `profile` meet in a field. It is linear, and exact to one f32 step.
+/// Returns the highest target SIR that N relays with the same `profile` meet in a field.
 ///
-/// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
-/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
-/// each three square roots for every point of the field and relay.
+/// It is linear, and exact to one f32 step. `None` without a field, or if no target is met. It is the optimum if no
+/// minimum separation is binding: `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. In an uneven
+/// field the result of Algorithm 4 may be lower. Work: 48 chains, each with three square roots for every point of the
+/// field and relay.
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;
     let met = |target: f32| is_met_by_equals(mission, target, profile);
-    // SIR of the last hop from right above Rx.
+    // SIR of the last hop with its relay right above Rx.
     let mut high = mission.receiver_gain(profile.power_w) / square(profile.altitude_m);
     if met(high) {
         return Some(high);

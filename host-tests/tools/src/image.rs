@@ -1,4 +1,4 @@
-//! Flash images: from the ELF that cargo links to the files that flash a board.
+//! Flash images: converts the ELF that cargo builds to files for flashing a board.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 use uav_relay_block::ADDRESS;
 
-/// Board for which `cargo image` can build a flash image.
+/// Board that `cargo image` supports.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Board {
     /// Name of the board, as given by `--board`.
@@ -18,17 +18,17 @@ pub struct Board {
     pub target: &'static str,
     manifest: &'static str,
     package: &'static str,
-    /// True if the board's images are examples of `package`, false if they are binaries of `package`.
+    /// True if the images are examples of `package`; false if they are binaries of it.
     examples: bool,
-    /// Names of the board's two images: with a UART to each neighbour, and with one UART to a shared radio.
+    /// Names of the board's two images: one UART to each neighbour, or one UART to a shared radio.
     images: [&'static str; 2],
     /// Flash address at which the board's firmware reads the configuration block.
     pub block: u32,
-    /// Family number of UF2 files that the board's boot ROM accepts; `None` if it reads no UF2 files.
+    /// UF2 family that the board's boot ROM accepts; `None` if it reads no UF2 files.
     pub uf2: Option<Family>,
 }
 
-/// Boards for which `cargo image` can build a flash image.
+/// Boards that `cargo image` supports.
 pub const BOARDS: [Board; 4] = [
     Board {
         name: "stm32f405",
@@ -78,7 +78,7 @@ impl Board {
         BOARDS.into_iter().find(|board| board.name == name)
     }
 
-    /// Returns the arguments of cargo that build the board's image, and the path of the resulting ELF.
+    /// Returns cargo's arguments for building the board's image, and the path of the ELF.
     ///
     /// `radio` selects the image for a shared radio. All paths are relative to the root of the checkout.
     pub fn build(&self, radio: bool) -> (Vec<String>, PathBuf) {
@@ -113,33 +113,35 @@ impl Board {
         (words.map(str::to_owned).into(), elf.join(image))
     }
 
-    /// Returns the file name of the board's image without extension; `radio` selects the image for a radio.
+    /// Returns the file name of the board's image without extension.
+    ///
+    /// `radio` selects the image for a shared radio.
     pub fn stem(&self, radio: bool) -> String {
         format!("{}-{}", self.name, if radio { "radio" } else { "wires" })
     }
 }
 
-/// Largest distance between the first bytes of an image's first and last part, bytes.
+/// Largest distance between the first bytes of two parts of an image, bytes.
 ///
-/// No supported flash is larger than this.
+/// No supported flash is larger.
 pub const LARGEST: u32 = 16 * 1024 * 1024;
 
-/// Value of a byte of erased flash.
+/// Value of a byte in erased flash.
 pub const BLANK: u8 = 0xFF;
 
 /// Part of an image: contiguous bytes, and the flash address of the first byte.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Piece {
-    /// Address in flash of the image's first byte.
+    /// Flash address of the first byte.
     pub address: u32,
-    /// Contents of this part of the flash image. The first byte is at `address`.
+    /// Contents of this part of the image, from `address` on.
     pub bytes: Vec<u8>,
 }
 
-/// Returns the pieces of an ELF file that are loaded into flash, by physical (load) address.
+/// Returns the parts of an ELF file that are loaded into flash, by physical (load) address.
 ///
 /// # Errors
-/// A line that states why the file is not a loadable ELF.
+/// A text that states why the file is not a loadable ELF.
 pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     let wrong = |error: object::Error| format!("not a 32-bit ELF file: {error}");
     let header = FileHeader32::<LittleEndian>::parse(elf).map_err(wrong)?;
@@ -163,10 +165,10 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     Ok(pieces)
 }
 
-/// Joins the pieces of an image into one, with erased bytes in the gaps.
+/// Joins the parts of an image into one, with erased bytes in the gaps.
 ///
 /// # Errors
-/// The pieces overlap, or a piece begins more than [`LARGEST`] bytes after the start of the first piece.
+/// Two parts overlap, or a part begins more than [`LARGEST`] bytes after the first part.
 pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
     let first = pieces
         .first()
@@ -199,7 +201,7 @@ pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
 
 const RECORD: u8 = 16;
 
-/// Returns the image as the text of an Intel HEX file, with 32-bit addresses. The error is a line for the user.
+/// Returns the image as the text of an Intel HEX file, with 32-bit addresses. The error is a text for the user.
 pub fn hex(pieces: &[Piece]) -> Result<String, String> {
     let mut records = Vec::new();
     let mut above = None;
@@ -247,10 +249,10 @@ pub fn hex(pieces: &[Piece]) -> Result<String, String> {
 //
 // All numbers are little-endian.
 
-/// Two words that each 512-byte block of a UF2 file begins with.
+/// First two words of each 512-byte block of a UF2 file.
 pub const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
 
-/// Word that each 512-byte block of a UF2 file ends with.
+/// Last word of each 512-byte block of a UF2 file.
 pub const END: u32 = 0x0AB1_6F30;
 
 /// Number of image bytes in each block of a UF2 file.
@@ -258,16 +260,16 @@ pub const PAGE: u32 = 256;
 
 const FAMILY_STATED: u32 = 0x2000;
 
-/// Family number in a UF2 file: only chips of this family accept the file.
+/// Family number in a UF2 file. Only chips of this family accept the file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Family(pub u32);
 
 impl Family {
-    /// Family number of the RP2350 with Arm cores in secure state.
+    /// Family of the RP2350 with Arm cores in secure state.
     pub const RP2350: Self = Self(0xE48B_FF59);
 }
 
-/// Returns the image as a UF2 file. Bytes of a page that no piece covers have the value of erased flash.
+/// Returns the image as a UF2 file. Bytes of a page that are not in the image have the value of erased flash.
 ///
 /// # Errors
 /// The image has more pages than the format can count.

@@ -17,10 +17,10 @@ use super::multi_interferer::optimum;
 
 const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 
-/// Random experiment: relays on a line of 1 km, and interferers that the relays may have to locate.
+/// Random experiment: relays on a line of 1 km, and interferers that they may have to locate.
 ///
-/// The interferers have 1 to 100 W. They are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D, with D the distance
-/// from Tx to Rx.
+/// The interferers have 1 to 100 W. They are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D; D is the distance from
+/// Tx to Rx.
 #[derive(Clone, Debug)]
 pub struct RandomScene {
     /// Geometry, powers and the true interferers.
@@ -76,7 +76,7 @@ impl RandomScene {
         Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
     }
 
-    /// Returns the mission loaded into the relays before flight, with `guess` as its interference.
+    /// Returns the mission that relays load before flight. Its interference is `guess`.
     pub fn mission(&self, guess: Interference) -> Result<Mission, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-4)?;
         let config = MissionConfig {
@@ -88,8 +88,7 @@ impl RandomScene {
 
     /// Returns the best SIR that relays can have if they know the interferers, linear.
     ///
-    /// For one interferer it is the SIR of a simulated chain that knows the interferer. For several interferers it is
-    /// the exact optimum.
+    /// For one interferer a chain is simulated that knows it. For several interferers it is the exact optimum.
     pub fn optimum(&self) -> Result<f64, FigureError> {
         let scene = self.scene()?;
         if scene.sources.len() > 1 {
@@ -100,7 +99,7 @@ impl RandomScene {
 
     /// Simulates a chain that knows the interferer, and returns the positions of its relays.
     ///
-    /// If there are several interferers, the chain knows the paper's hypothetical interferer instead of them.
+    /// Several interferers are replaced by the paper's hypothetical interferer.
     pub fn known_positions(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
@@ -108,7 +107,7 @@ impl RandomScene {
         places.ok_or(FigureError::Unsettled("a chain that knows the interferer"))
     }
 
-    /// Returns a simulation whose relays measure the interference every 5 s, and move instantly.
+    /// Returns a simulation whose relays measure the interference every 5 s, and move at once.
     ///
     /// `guess` is the interference that the relays assume before the first measurement.
     pub fn setup(&self, guess: Interference) -> Result<Setup, FigureError> {
@@ -124,7 +123,7 @@ impl RandomScene {
         Ok(setup)
     }
 
-    /// Returns a simulation whose relays are drones of 10 m/s, and measure the interference every second.
+    /// Returns a simulation of drones that fly 10 m/s, and measure the interference every second.
     ///
     /// They start beside Tx. `guess` is the interference that the relays assume before the first measurement.
     pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
@@ -142,7 +141,7 @@ impl RandomScene {
 
 /// Returns the chain's SIR with the true interferers after each agreement on positions, linear.
 ///
-/// The relays had no measurements at the first agreement. `stands` are the states of the simulated chain in order.
+/// At the first agreement the relays have no measurements. `stands` are the states of the simulated chain in order.
 pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
     let mut sirs = Vec::new();
     for stand in stands {
@@ -155,17 +154,17 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
     sirs
 }
 
-/// Number of agreements based on measurements up to which the figure shows the SIR.
+/// Largest number of agreements with measurements in the figure.
 pub const LAST: usize = 8;
 
-/// Ratios of the SIR to the best possible SIR. List k has the ratios after k agreements with measurements.
+/// Fractions of the best possible SIR that chains reach. List k is for k agreements with measurements.
 ///
-/// Each list has one ratio for each random experiment.
+/// Each list has one value for each random experiment.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// Simulates `scenes` random experiments; returns ratios of the chains' SIRs to the best possible SIRs.
+/// Simulates `scenes` random experiments. Returns the fractions of the best possible SIR.
 ///
-/// There is a ratio after each agreement on positions. `setup` returns the simulation of an experiment.
+/// There is a value after each agreement on positions. `setup` returns the simulation of an experiment.
 pub fn shares(
     scenes: u64,
     relays: u16,
@@ -206,7 +205,7 @@ pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
 
 /// Returns a simulation without measurements, whose relays know the interferer.
 ///
-/// If there are several interferers, the relays know the paper's hypothetical interferer instead of them.
+/// Several interferers are replaced by the paper's hypothetical interferer.
 pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     (setup.mission, _) = mission(&wild.scenario, wild.relays, 1e-4)?;
@@ -214,7 +213,9 @@ pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     Ok(setup)
 }
 
-/// Returns the quantile of `numbers` at the fraction `part`, 0 to 1 (0.5 is the median). NaN if `numbers` is empty.
+/// Returns the quantile of `numbers` at the fraction `part`, 0 to 1; 0.5 is the median.
+///
+/// NaN if `numbers` is empty.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -227,25 +228,26 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
     numbers.get(at).copied().unwrap_or(f64::NAN)
 }
 
-/// Time after the start of a run from which its SIRs are averaged, s.
+/// Time from the start of a run, s, after which its SIRs count for the mean.
 const BEGUN_S: u32 = 60;
 
-/// Mean ratios of the SIR to the best possible SIR at the same moment, one for each experiment.
+/// Means of SIR / best possible SIR at each moment, one mean for each experiment.
 ///
 /// The interferer moves. The first minute of a run does not count.
 #[derive(Clone, Debug, Default)]
 pub struct MovingShares {
-    /// Mean ratios of chains that follow the moving interferer, one for each experiment.
+    /// Mean fractions of chains that follow the interferer, one for each experiment.
     pub followed: Vec<f64>,
-    /// Mean ratios of chains that do not move, one for each experiment. They keep the positions that were best after
-    /// the first minute.
+    /// Mean fractions of chains that do not move, one for each experiment.
+    ///
+    /// They keep the positions that were best after the first minute.
     pub stayed: Vec<f64>,
 }
 
-/// Simulates `scenes` experiments in which an interferer moves in parallel to the line Tx-Rx.
+/// Simulates `scenes` experiments with an interferer that moves parallel to the line Tx-Rx.
 ///
-/// The interferer is 300 m beside the line. Returns the mean ratios of the SIR to the best possible SIR, for chains
-/// that track the interferer and for chains that do not move.
+/// The interferer is 300 m from this line. Returns the mean fractions of the best possible SIR, for chains that follow
+/// the interferer and for chains that do not move.
 pub fn moving_shares(
     scenes: u64,
     relays: u16,
@@ -261,7 +263,7 @@ pub fn moving_shares(
 
 fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError> {
     let mut wild = RandomScene::new(seed, relays, 1);
-    // Half-way through, the interferer is beside the middle of the line.
+    // Halfway through the run, the interferer is beside the middle of the line Tx-Rx.
     let span_s = 600.0 / speed_mps.max(3.0) + f64::from(BEGUN_S);
     let half_s = 0.5 * (span_s + f64::from(BEGUN_S));
     wild.place(500.0 - speed_mps * half_s, 300.0);
@@ -301,8 +303,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     }
 }
 
-/// Returns the arithmetic mean of `shares`, which are SIRs divided by the best possible SIRs. NaN if `shares` is
-/// empty.
+/// Returns the mean of `shares`, fractions of the best possible SIR. NaN if `shares` is empty.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

@@ -29,18 +29,18 @@ fn variable(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-/// Random scene. `places` are positions of each interferer: a fine grid of its area, or one point.
+/// Random scene. `places` has the positions to check for each interferer: a fine grid of its area, or one point.
 struct Drawn {
     scenario: Scenario,
     relays: u16,
     is_free: bool,
-    /// Outline of each interferer's area, empty without an area.
+    /// Outline of each interferer's area; empty without an area.
     outlines: Vec<Vec<[f64; 2]>>,
     places: Vec<Vec<[f64; 2]>>,
     powers_w: Vec<f64>,
 }
 
-/// Returns the position of the polygon's edges that is nearest to `at`; `None` without edges.
+/// Returns the point on the polygon's edges nearest to `at`; `None` without edges.
 fn nearest_on(outline: &[[f64; 2]], at: [f64; 2]) -> Option<[f64; 2]> {
     let edges = outline.iter().zip(outline.iter().cycle().skip(1));
     let on_edge = edges.map(|([ax, ay], [bx, by])| {
@@ -53,7 +53,7 @@ fn nearest_on(outline: &[[f64; 2]], at: [f64; 2]) -> Option<[f64; 2]> {
     on_edge.min_by(|a, b| far(a).total_cmp(&far(b)))
 }
 
-/// Returns true if the polygon contains `at`, by its winding number. The planner uses another method.
+/// Returns true if the polygon contains `at`. It uses the winding number, unlike the planner.
 fn winds(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
     let angle = |i: usize| {
         let [x, y] = outline[i % outline.len()];
@@ -68,7 +68,7 @@ fn winds(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
     total.abs() > 3.0
 }
 
-/// Returns points on the outline and inside it.
+/// Returns about `number` points on the outline, and points inside it.
 fn fine_grid(outline: &[[f64; 2]], number: usize) -> Vec<[f64; 2]> {
     let length = |i: usize| {
         let ([a, b], [c, d]) = (outline[i], outline[(i + 1) % outline.len()]);
@@ -107,7 +107,7 @@ fn fine_grid(outline: &[[f64; 2]], number: usize) -> Vec<[f64; 2]> {
     points
 }
 
-/// Draws an area as TOML, with its outline.
+/// Draws an area. Returns it as TOML, and its outline.
 fn area_of(rng: &mut ChaCha8Rng, d: f64, most_m: f64) -> (String, Vec<[f64; 2]>) {
     let (x, y) = (
         rng.random_range(-0.3 * d..1.3 * d),
@@ -134,7 +134,7 @@ fn area_of(rng: &mut ChaCha8Rng, d: f64, most_m: f64) -> (String, Vec<[f64; 2]>)
             (text, vec![[a, b], [c, b], [c, e], [a, e]])
         }
         _ => {
-            // Seldom convex.
+            // The polygon is seldom convex.
             let corners = rng.random_range(3..9);
             let outline = round(corners, &mut || size * rng.random_range(0.2..1.0));
             (format!("polygon = {outline:?}"), outline)
@@ -170,7 +170,6 @@ fn draw(seed: u64) -> Drawn {
         if rng.random() {
             text += "[noise]\nbandwidth_hz = 1e7\n";
         }
-        // The joint method of both directions is one for known interferers.
         if rng.random_range(0..3) == 0 {
             _ = writeln!(text, "[link]\nreverse = {:?}", rng.random_range(0.2..1.0));
         }
@@ -238,14 +237,14 @@ fn draw(seed: u64) -> Drawn {
     }
 }
 
-/// Judge: the SIR of the worst hop for every position of the interferers on a grid.
+/// Independent check: the SIR of the worst hop for all positions of the interferers on a grid.
 struct Judge<'a> {
     drawn: &'a Drawn,
     scene: Scene,
 }
 
 impl Judge<'_> {
-    /// Returns the least SIR over all positions of the interferers; each relay is [x, y, h].
+    /// Returns the least SIR over all positions of the interferers. Each relay is [x, y, h].
     fn worst(&self, chain: &[[f64; 3]]) -> f64 {
         let s = &self.scene;
         let mut nodes = vec![[0.0; 3]];
@@ -273,7 +272,7 @@ impl Judge<'_> {
                 signals.push((hop, power(hop + 1) * gain / s.reverse));
             }
         }
-        // The positions right below the receivers and those of the outline nearest to them are on the grid, too.
+        // The grid includes the positions right below the receivers, and the outline's points nearest to them.
         let grids: Vec<Vec<[f64; 2]>> = self
             .drawn
             .places
@@ -421,7 +420,7 @@ fn the_worst_case_is_that_of_brute_force() {
         };
         let planned = plan(scenario, &ask(*relays, *is_free)).unwrap();
         let judged = judge.worst(&points(&planned));
-        // The closed form of the worst case is that of the grid; between its points an interferer may be a little worse.
+        // The planner's worst case equals the grid's. Between grid points an interferer may be a little worse.
         let form = planned.sir() / judged;
         assert!((0.99..=1.0 + 1e-5).contains(&form), "seed {seed}: {form}");
         let brute = judge.best(seed);
@@ -458,7 +457,7 @@ fn the_worst_case_is_that_of_brute_force() {
     }
 }
 
-/// Returns the quantile `share` of the worst hop's SIR over positions and powers that this test draws.
+/// Returns the SIR of the worst hop at the quantile `share`, over positions and powers drawn here.
 fn quantile(drawn: &Drawn, plan: &Plan, share: f64) -> f64 {
     let rng = &mut ChaCha8Rng::seed_from_u64(99);
     let mut scene = Scene::new(&drawn.scenario, drawn.relays).unwrap();
@@ -507,7 +506,7 @@ fn the_plan_by_a_quantile_has_a_better_quantile() {
         let own = quantile(&drawn, &by_quantile, 0.8);
         let report =
             area::AreaReport::new(&drawn.scenario, &request, &by_quantile, Some(0.8)).unwrap();
-        // 4000 and 3000 draws.
+        // The planner has 4000 draws, and this test 3000.
         let error_db = report.plan.quantile_sir_db - 10.0 * own.log10();
         assert!(error_db.abs() < 0.5, "seed {seed}: {error_db}");
         better.push(10.0 * (own / quantile(&drawn, &worst, 0.8)).log10());
@@ -515,7 +514,7 @@ fn the_plan_by_a_quantile_has_a_better_quantile() {
         over_centre.push(10.0 * (own / quantile(&drawn, &centre, 0.8)).log10());
     }
     println!("gain over the worst-case plan {better:.2?} dB, over the middle {over_centre:.2?} dB");
-    // The draws of the test are others.
+    // The draws of this test differ from those of the planner.
     assert!(better.iter().chain(&over_centre).all(|gain| *gain > -0.2));
     assert!(
         count < 8 || better.iter().any(|gain| *gain > 0.1),
@@ -547,7 +546,7 @@ const AREA: &str = "[geometry]\naltitude_m = 60\naltitude_max_m = 100\nmin_separ
 const FLAT: &str = "[geometry]\ndistance_m = 2000\naltitude_m = 60\n[power]\ntx_w = 5\nuav_w = 1\n\
     [[interferer]]\npower_w = 1\nx_m = 1300\ny_m = 700\n";
 
-/// Runs `cargo provision` for all three relays of `file` in `folder`. Returns true if it succeeds, and its errors.
+/// Runs `cargo provision` for all three relays of `file`. Returns true if it succeeds, and its errors.
 fn provision(folder: &Path, file: &str) -> (bool, String) {
     let options = format!("--scenario {file} --uavs 3 --all --out-dir blocks");
     let out = Command::new(env!("CARGO_BIN_EXE_provision"))
@@ -582,7 +581,7 @@ fn the_command_reports_the_area_and_draws_its_map() {
     assert!((number(&area["worst_sir_db"]) - number(&sir_db)).abs() < 1e-6);
     assert!(number(&area["worst_sir_db"]) <= number(&area["quantile_sir_db"]));
     assert!(number(&area["centre"]["worst_sir_db"]) < number(&area["worst_sir_db"]) - 0.1);
-    // The cells of the map reach the worst case, apart from the size of a cell.
+    // The lowest SIR on the map is the worst case, apart from the size of a cell.
     let cells: Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join("map.geojson")).unwrap())
             .unwrap();
@@ -596,7 +595,7 @@ fn the_command_reports_the_area_and_draws_its_map() {
     let least = sirs().fold(f64::INFINITY, f64::min);
     assert!((least - number(&sir_db)).abs() < 0.15, "{least} {sir_db}");
     assert!(sirs().fold(0.0, f64::max) > least + 1.0);
-    // The circle is south of a line to the east: y is to the right.
+    // The circle is south of the line, which runs east: y is to the right.
     assert!(
         cells
             .iter()
@@ -610,11 +609,11 @@ fn the_command_reports_the_area_and_draws_its_map() {
             .count()
             > cells.len()
     );
-    // A quantile is its own criterion, and no worst case.
+    // With a quantile, the criterion is not the worst case.
     let (_, by_quantile) = json(folder, &[base.as_slice(), &["--quantile", "0.8"]].concat());
     assert_eq!(by_quantile["area"]["criterion"], "quantile");
     assert!(number(&by_quantile["area"]["worst_sir_db"]) <= number(&area["worst_sir_db"]) + 1e-6);
-    // A target is met at the worst position.
+    // The target is met even at the worst position.
     let (status, fewest) = json(folder, &["--scenario", "area.toml", "--target-sir-db", "9"]);
     assert_eq!(status, 0);
     assert!(number(&fewest["area"]["worst_sir_db"]) >= 9.0, "{fewest}");
@@ -631,7 +630,7 @@ fn the_command_reports_the_area_and_draws_its_map() {
             "{line}"
         );
     }
-    // Relays know one position: other tools refuse the file by name.
+    // Relays know a single position, so other tools reject the file and name the area.
     let (succeeds, line) = provision(folder, "area.toml");
     assert!(
         !succeeds && line.contains("interferer[0].area") && line.contains("1300.0"),
@@ -641,7 +640,7 @@ fn the_command_reports_the_area_and_draws_its_map() {
 
 /// Checks the planner's error of a located interferer against the scatter of least-squares fits.
 ///
-/// The fits are to randomly drawn measurements. The difference must be below 15 %.
+/// The fits are to random measurements. The two must differ by less than 15 %.
 #[test]
 fn the_error_of_the_location_is_that_of_fits() {
     let rng = &mut ChaCha8Rng::seed_from_u64(7);
@@ -694,7 +693,7 @@ fn the_error_of_the_location_is_that_of_fits() {
                 each.map(|((at, heard), error)| ((heard - ln(of, at)) / error).powi(2))
                     .sum()
             };
-            // Gauss-Newton steps with slopes by differences.
+            // Gauss-Newton steps, with slopes from differences.
             let mut fit = truth;
             for _ in 0..8 {
                 let step = [1e-4, 1e-2, 1e-2];
@@ -747,7 +746,7 @@ fn the_error_of_the_location_is_that_of_fits() {
     }
 }
 
-/// Checks the planner's report and map of the part of an area in which relays locate an interferer.
+/// Checks the planner's report and map about where relays can locate an interferer.
 ///
 /// Simulated searches must locate it with less than three times the reported error.
 #[test]
@@ -781,7 +780,7 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
             number(one, "placed_s").unwrap(),
         );
         assert!(estimate > 1.0 && placed < 280.0, "{one}");
-        // The relays measure many times: the bound is for one measurement at each position.
+        // The reported error is for one measurement at each position. The relays measure many times.
         assert!(
             number(one, "off_m").unwrap() < 3.0 * number(one, "error_m").unwrap(),
             "{one}"
@@ -803,7 +802,7 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
                 == 5,
         "{table}"
     );
-    // So far away, the measurements do not determine the location: JSON has no infinite numbers.
+    // The measurements do not determine the location of so far an interferer. JSON has no infinite numbers.
     let far = text.replace(
         "rectangle = [[200.0, 150.0], [900.0, 700.0]]",
         "circle = [500, 2e6, 300]",
@@ -859,7 +858,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     let (_, free) = json(folder, &base);
     let x = |report: &Value, relay: usize| report["relays"][relay]["x_m"].as_f64().unwrap();
     let (own, best) = (x(&free, 1), free["sir"].as_f64().unwrap());
-    // An area elsewhere, or above the relays, changes nothing.
+    // An area far away, or above the relays, changes nothing.
     for zone in [
         "area = { circle = [1000, 500, 300] }".to_owned(),
         format!("area = {{ circle = [{own}, 0, 50] }}\nlowest_m = 61"),
@@ -867,7 +866,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         write(&zone);
         assert_eq!(json(folder, &base), (0, free.clone()), "{zone}");
     }
-    // Relay 2 moves out along the line; the area is still between two neighbours.
+    // Relay 2 moves along the line out of the area. The area is then between two neighbours.
     let zone = format!(
         "area = {{ rectangle = [[{}, -30], [{}, 40]] }}",
         own - 60.0,
@@ -875,7 +874,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     );
     write(&zone);
     let (status, one_side) = json(folder, &base);
-    // No way crosses the area if all relays are on one side of it.
+    // No path crosses the area if all relays are on one side of it.
     assert_eq!(status, 0, "{one_side}");
     assert!(
         x(&one_side, 2) <= own - 59.98 || x(&one_side, 0) >= own + 49.98,
@@ -900,7 +899,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         assert!(line.contains(part), "{line}");
     }
     assert_eq!(area::problem(&zones, &chain, false, true), None);
-    // A way that --allow-crossing accepts is named, also without --out.
+    // A path accepted by --allow-crossing is reported, also without --out.
     let out = cargo_plan(folder, &[base.as_slice(), &["--allow-crossing"]].concat());
     let text = String::from_utf8_lossy(&out.stderr);
     assert!(
@@ -909,7 +908,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
             && text.trim_end().ends_with("accepted by --allow-crossing"),
         "{text}"
     );
-    // Relays that compute their own positions would be inside.
+    // Relays that compute their own positions would be inside the area.
     let out = cargo_plan(
         folder,
         &[base.as_slice(), &["--allow-crossing", "--out", "out.toml"]].concat(),
@@ -927,7 +926,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         !succeeds && text.contains("relay 2 is") && text.contains("inside no_fly[0]"),
         "{text}"
     );
-    // With room beside the line or above the area no way crosses it.
+    // If relays can fly beside or above the area, no path crosses it.
     let low = format!("{zone}\nhighest_m = 80");
     for (zone, geometry) in [
         (&zone, "lateral_max_m = 200"),
@@ -992,11 +991,11 @@ fn a_plan_in_another_folder_finds_its_files() {
     assert_eq!(scenario.no_fly.len(), 1);
     let (succeeds, said) = provision(folder, "other/plan.toml");
     assert!(succeeds && !said.contains("not signed"), "{said}");
-    // Beside the scenario nothing changes.
+    // In the folder of the scenario the paths stay as they are.
     assert!(of("own/plan.toml").contains("\nfile = \"zones.geojson\"\n"));
 }
 
-/// Checks no-fly areas on the ways that relays with their own altitudes fly, and after each loss.
+/// Checks no-fly areas on the paths of relays with their own altitudes, and after each loss.
 #[test]
 fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let folder = tempfile::tempdir().unwrap();
@@ -1007,7 +1006,7 @@ fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let base = ["--scenario", "flight.toml", "--uavs", "3"];
     let (_, free) = json(folder, &base);
     let x = |relay: usize| free["relays"][relay]["x_m"].as_f64().unwrap();
-    // The straight line from 40 m to 120 m passes above the area. Relay 1 flies through it at 40 m.
+    // The straight line from 40 m to 120 m is above the area. Relay 1 crosses the area at 40 m.
     let zone = |from: f64, to: f64, highest_m: f64| {
         format!(
             "{own}[[no_fly]]\narea = {{ rectangle = [[{from}, -30], [{to}, 30]] }}\nhighest_m = {highest_m}\n"
@@ -1020,7 +1019,7 @@ fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let line = area::problem(&scenario, &chain, false, false).unwrap();
     let part = "the line from relay 1 to relay 2 crosses no_fly[0] (0 to 60 m) for 20.0 m from the altitude 40.0 m";
     assert!(line.contains(part), "{line}");
-    // With free altitudes relay 1 keeps its own, and so does relay 2.
+    // With free altitudes, too, relays 1 and 2 keep their own.
     assert!(
         area::problem(&scenario, &chain, true, false)
             .unwrap()
@@ -1031,12 +1030,12 @@ fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
         ..scenario
     };
     assert_eq!(area::problem(&free_ones, &chain, true, false), None);
-    // The planner searches for positions without such a way.
+    // The planner searches for positions without such a path.
     let (status, around) = json(folder, &base);
     let at = |relay: usize| around["relays"][relay]["x_m"].as_f64().unwrap();
     assert_eq!(status, 0, "{around}");
     assert!(at(0) >= middle + 19.9 || at(1) <= middle + 0.1, "{around}");
-    // Without relay 2, relay 1 flies 14.8 m: through an area, or into it.
+    // If relay 2 is lost, relay 1 flies 14.8 m: through an area, or into it.
     write(&zone(x(0) + 3.0, x(0) + 10.0, 60.0)).unwrap();
     let out = ["--allow-crossing", "--out", "out.toml", "--force"];
     let planned = cargo_plan(folder, &[base.as_slice(), &out].concat());
@@ -1055,7 +1054,7 @@ fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let part = "without relay 2: relay 1 is ";
     assert!(planned.status.success() && said.contains(part), "{said}");
     assert!(said.contains(" m inside no_fly[0] (0 to 60 m)"), "{said}");
-    // Areas are not skipped silently.
+    // A message says that no-fly areas are not checked.
     let text = std::fs::read_to_string(folder.join("flight.toml")).unwrap();
     let (before, after) = text.split_once("[[interferer]]").unwrap();
     let (_, relays) = after.split_once("[[relay]]").unwrap();
@@ -1094,7 +1093,7 @@ fn wrong_areas_are_refused_by_name() {
         )
         .unwrap();
     }
-    // The hole before the boundary, and in the right order.
+    // The ring of the hole before the boundary, and after it.
     let rings = [
         [8.521, 47.1992, 8.522, 47.1996],
         [8.52, 47.199, 8.523, 47.201],
@@ -1298,7 +1297,7 @@ fn wrong_areas_are_refused_by_name() {
             zone("file = \"line.geojson\""),
             ["has a LineString", "Polygon or MultiPolygon"],
         ),
-        // A damaged part beside a good one is not left out.
+        // A damaged part is an error, even beside a good part.
         (
             zone("file = \"keys.geojson\""),
             ["has a Feature without geometry", "Polygon"],

@@ -50,7 +50,7 @@ fn number(value: &Value) -> f64 {
 
 /// Writes a scenario file with the geometry and powers of a reference case, and `interference`.
 ///
-/// It has the default channel, which is the paper's.
+/// The channel is the default, which is the paper's.
 fn scenario(case: &Case, interference: &str) -> tempfile::NamedTempFile {
     let p = &case.params;
     let mut text = String::new();
@@ -120,7 +120,7 @@ fn the_command_prints_the_references_theorems() {
     }
 }
 
-/// Checks that a single relay that may leave the line is placed beside it, at the reference's optimum.
+/// Checks that a relay with lateral freedom has the reference's SIR.
 #[test]
 fn one_lateral_relay_agrees_with_the_3d_reference() {
     let side = example("side.toml");
@@ -145,7 +145,7 @@ fn one_lateral_relay_agrees_with_the_3d_reference() {
     let best = optimum(&link, corridor, &[]).unwrap().unwrap();
     let sir = number(&report["sir"]);
     assert!((sir / best.sir - 1.0).abs() < 1e-5, "{sir} {best:?}");
-    // With a given altitude it stays above the line.
+    // With a given altitude the relay has no lateral offset.
     let report = json(&format!("--scenario {side} --uavs 1"));
     assert_eq!(report["theorem"].as_u64(), Some(1), "{report}");
 }
@@ -217,7 +217,7 @@ fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
     let report = json("--target-rate-bps 6e6 --bandwidth-hz 1e7");
     assert_eq!(report["uavs"].as_u64(), Some(1), "{report}");
     assert!(number(&report["rate_bps"]) >= 6e6);
-    // Twelve relays give each hop 20 Mbit/s while it sends, but the chain carries only a thirteenth of it.
+    // With twelve relays each hop sends 20 Mbit/s, but only a thirteenth of the time.
     let (status, line) = refusal("--target-rate-bps 2e7 --bandwidth-hz 1e7");
     assert_eq!(status, 1, "{line}");
     for part in [
@@ -244,7 +244,7 @@ fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
         let rate = number(&ask(&format!("--uavs {beside}"))["rate_bps"]);
         assert!(rate <= number(&one["best_rate_bps"]), "{beside}: {rate}");
     }
-    // The fewest relays that meet the target, not the number with the largest rate.
+    // These are the fewest relays that meet the target, and not the number with the largest rate.
     let half = 0.5 * (number(&one["rate_bps"]) + number(&one["best_rate_bps"]));
     let met = ask(&format!("--target-rate-bps {half:?}"));
     let uavs = met["uavs"].as_u64().unwrap();
@@ -253,7 +253,7 @@ fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
     assert!(number(&fewer["rate_bps"]) < half, "{fewer}");
 }
 
-/// Checks the SIR of each hop on the way from Rx to Tx against formulas in this test.
+/// Checks the SIR of each hop from Rx to Tx against formulas in this test.
 #[test]
 fn the_way_back_is_reported_for_every_hop() {
     let file = tempfile::NamedTempFile::new().unwrap();
@@ -300,11 +300,11 @@ fn the_way_back_is_reported_for_every_hop() {
         "{table}"
     );
     assert!(table.contains(", from Rx to relay 3\n"), "{table}");
-    // Without a power of its own Rx sends with that of Tx.
+    // Without its own power Rx sends with the power of Tx.
     let default = json("--uavs 3");
     let ratio = number(&default["rx_sir_back"]) / number(&report["rx_sir_back"]);
     assert!((ratio / 16.0 - 1.0).abs() < 1e-9, "{ratio}");
-    // In a field the interference at Tx has no value.
+    // In a field the interference at Tx is unknown.
     let field = format!("{}/../../examples/field.toml", env!("CARGO_MANIFEST_DIR"));
     assert!(json(&format!("--uavs 3 --scenario {field}"))["worst_back"].is_null());
 }
@@ -356,7 +356,7 @@ fn steps_of_a_radio_are_met_by_the_fewest_relays() {
     let fewer = json(&format!("--scenario {path} --uavs {}", uavs - 1));
     assert!(number(&fewer["sir_db"]) < 5.0, "{fewer}");
     assert!((number(&fewer["rate_bps"]) - 2e6).abs() < 1e-6, "{fewer}");
-    // The largest step is reached: no other number carries more.
+    // The last rate step is reached, so no other number carries more.
     assert_eq!(met["best_uavs"].as_u64(), Some(uavs), "{met}");
     assert_eq!(met["best_is_proven"].as_bool(), Some(true), "{met}");
     let rates = met["rates"].as_array().unwrap();
@@ -364,7 +364,7 @@ fn steps_of_a_radio_are_met_by_the_fewest_relays() {
     for (relays, rate) in (1..).zip(rates) {
         assert_eq!(rate["uavs"].as_u64(), Some(relays));
     }
-    // One frequency divides the steps by the slots.
+    // With one frequency the rate is divided by the number of slots.
     let slots = linked(steps);
     let path = slots.path().to_str().unwrap();
     let shared = json(&format!("--scenario {path} --uavs {uavs}"));
@@ -373,7 +373,7 @@ fn steps_of_a_radio_are_met_by_the_fewest_relays() {
         (number(&shared["rate_bps"]) / expected - 1.0).abs() < 1e-12,
         "{shared}"
     );
-    // Below the first step no data passes.
+    // Below the first rate step no data passes.
     let high = linked("steps = [{ sinr_db = 80, bits_per_hz = 1 }]\n");
     let output = plan(&format!("--scenario {} --uavs 2", high.path().display()));
     let table = String::from_utf8(output.stdout).unwrap();
@@ -422,7 +422,7 @@ fn the_answer_names_what_the_model_leaves_out() {
     }
 }
 
-/// Checks that the planner reports a wrong UDP port of the autopilot in one line, before the flight.
+/// Checks that the planner reports a wrong UDP port of the autopilot in one line.
 #[test]
 fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     let drone = include_str!("../../../examples/drone.toml");
@@ -450,12 +450,12 @@ fn an_unreachable_target_is_status_1_and_names_the_maximum() {
             .contains("gives every hop an SIR of 60 dB: the highest SIR is 20.980 dB, with "),
         "{report}"
     );
-    // The reported maximum can be met, and nothing above it.
+    // The reported maximum can be met, and no higher SIR.
     let told = format!("{:?}", most * (1.0 - 1e-5));
     assert!(number(&json(&format!("--target-sir {told}"))["sir"]) >= most * (1.0 - 1e-4));
     let more = format!("{:?}", most * 1.001);
     assert_eq!(refusal(&format!("--target-sir {more}")).0, 1);
-    // More relays than the distance allows.
+    // So many relays do not fit between Tx and Rx.
     let (status, line) = refusal("--uavs 1000");
     assert!(status == 1 && line.contains("min_separation_m"), "{line}");
 }
@@ -491,7 +491,7 @@ fn several_interferers_get_a_rated_hypothetical_one() {
         x.map(|x| format!("[[interferer]]\npower_w = 40.0\nx_m = {x:?}\ny_m = {y:?}\n"))
             .concat()
     };
-    // Interferers next to each other: the hypothetical one is good enough.
+    // Interferers close together: the hypothetical interferer is good enough.
     let file = scenario(case, &two([490.0, 510.0], 400.0));
     let path = file.path().to_str().unwrap();
     let near = json(&format!("--scenario {path} --uavs 8"));
@@ -514,7 +514,7 @@ fn several_interferers_get_a_rated_hypothetical_one() {
     );
     let alone = json("--uavs 8");
     assert!((number(&near["sir"]) / number(&alone["sir"]) - 1.0).abs() < 0.01);
-    // Interferers far apart: no hypothetical one is good enough, and the plan's positions are better.
+    // Interferers far apart: the hypothetical interferer is not good enough, and the plan has better positions.
     let file = scenario(case, &two([100.0, 900.0], 150.0));
     let path = file.path().to_str().unwrap();
     let far = json(&format!("--scenario {path} --uavs 8"));
@@ -539,7 +539,7 @@ fn free_altitudes_give_the_joint_optimum() {
         "{free}"
     );
     assert_eq!(free["proven"].as_bool(), Some(false));
-    // Free altitudes need no more relays.
+    // With free altitudes no more relays are needed.
     let given = json(&format!("--scenario {altitudes} --target-sir 2"));
     let fewer = json(&format!(
         "--scenario {altitudes} --target-sir 2 --altitude free"
@@ -612,7 +612,7 @@ fn invalid_requests_are_refused_with_a_reason() {
     let field = example("field.toml");
     let (status, line) = refusal(&format!("--uavs 1 --x-m 3 --scenario {field}"));
     assert!(status == 2 && line.contains("[[interferer]]"), "{line}");
-    // Without a scenario file the message names the numbers and the keys of such a file.
+    // Without a scenario file the message names the keys to change in one.
     let (status, line) = refusal("--uavs 300");
     assert_eq!(status, 1);
     assert!(
@@ -631,7 +631,7 @@ fn maps_are_written_for_scenarios_with_sites() {
         example("site.toml")
     ));
     let geojson: Value = serde_json::from_str(&std::fs::read_to_string(geojson).unwrap()).unwrap();
-    // Tx, Rx, three relays, the interferer, four hops.
+    // Tx, Rx, three relays, the interferer, and four hops.
     assert_eq!(geojson["features"].as_array().unwrap().len(), 10);
     let kml = std::fs::read_to_string(kml).unwrap();
     let kml = roxmltree::Document::parse(&kml).unwrap();
@@ -730,7 +730,7 @@ fn a_theorems_case_is_explained_for_the_drone() {
     }
 }
 
-/// Checks that numbers on a map are rounded for people: to mm, thousandths of a dB, or whole counts.
+/// Checks that numbers on a map are rounded for display: to mm, thousandths of a dB, or whole counts.
 #[test]
 fn a_map_has_rounded_numbers_with_units_in_their_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -790,7 +790,7 @@ fn a_map_has_rounded_numbers_with_units_in_their_names() {
     assert!(numbers > 20, "{text}");
 }
 
-/// Writes a copy of `examples/scenario.toml` with the lines `sections` at the start of table `[power]`.
+/// Writes a copy of `examples/scenario.toml` with the lines `sections` at the start of `[power]`.
 fn with(sections: &str) -> tempfile::NamedTempFile {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let text = std::fs::read_to_string(example("scenario.toml")).unwrap();
@@ -810,7 +810,7 @@ fn json_of(file: &tempfile::NamedTempFile) -> Value {
 
 /// Checks the planner's noise power k T0 B F.
 ///
-/// It is 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, which is -94.96489 dBm.
+/// It is 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, or -94.96489 dBm.
 #[test]
 fn the_noise_is_k_t_b_f_and_names_its_terms() {
     let noisy = "\n[noise]\nbandwidth_hz = 20e6\nfigure_db = 6.0\n";
@@ -843,7 +843,7 @@ fn the_noise_is_k_t_b_f_and_names_its_terms() {
         "{effective:e}"
     );
 
-    // No derivation for a power stated in the file, or without noise.
+    // The report has no terms of the noise if the file gives its power, or without noise.
     for given in ["\n[noise]\npower_dbm = -95.0\n", ""] {
         std::fs::write(file.path(), format!("{plain}{given}")).unwrap();
         assert!(json_of(&file)["noise"].is_null(), "{given}");

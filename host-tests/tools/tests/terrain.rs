@@ -31,7 +31,7 @@ use uav_relay_tools::plan::{Number, PlanRequest, plan};
 
 const EXAMPLE: &str = "../../examples/hills.toml";
 
-/// Writes random hills along a line of 5 km, and a scenario above them with `more` in its file.
+/// Writes random hills along a line of 5 km, and a scenario above them that contains `more`.
 fn scene(folder: &Path, rng: &mut impl rand::Rng, more: &str) -> Scenario {
     let mut wave = || {
         let [east, north] = [(); 2].map(|()| rng.random_range(-1.0_f64..1.0) / 250.0);
@@ -81,7 +81,7 @@ fn elevation(scenario: &Scenario) -> Elevation {
     Elevation::load(scenario, &[], 1.0).unwrap().unwrap()
 }
 
-/// Returns the SIR of the best chain over all combinations of one candidate position for each relay.
+/// Returns the SIR of the best chain over all combinations of the relays' candidate positions.
 fn brute_force(
     search: &mut Search<'_>,
     candidates: &[Vec<Candidate>],
@@ -127,7 +127,7 @@ fn the_search_finds_the_best_chain_of_a_small_grid() {
         let mut search = Search::new(&scenario, &scene, &elevation).unwrap();
         let grid = search.grid(columns, levels).unwrap();
         let (chain, sir) = search.best(&grid, 0.0).unwrap();
-        // A floor up to the result does not change it.
+        // A floor up to the result's SIR does not change the result.
         assert_eq!(
             search.best(&grid, sir),
             Some((chain.clone(), sir)),
@@ -149,10 +149,10 @@ fn the_search_finds_the_best_chain_of_a_small_grid() {
     }
 }
 
-/// Checks that positions for the terrain are no worse than the joint method's and those at 120 m.
+/// Checks that positions for the terrain are no worse than those that ignore it.
 ///
-/// If relays can fly to the other positions, the loss must be below 0.01 dB. The median gain over all scenes must be
-/// above -0.1 dB.
+/// The others are the joint method's positions, and positions at 120 m. If they can be flown, the loss must be below
+/// 0.01 dB. The median gain over all scenes must be above -0.1 dB.
 #[test]
 fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -173,7 +173,7 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
         };
         let known = over_terrain::best(&scenario, &elevation, relays, 1e-4).unwrap();
         let report = elevation.report(&scenario, &known).unwrap();
-        // The terrain is sampled more finely in the report.
+        // The report has more terrain points than the search.
         let scene = elevation.scene(&scenario, relays).unwrap().unwrap();
         assert!(
             report.terrain_sir
@@ -217,7 +217,7 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
 
 /// Checks that relays reach the reported positions, rooms and SIRs when they fly over terrain.
 ///
-/// A relay's room is the interval of x in which it may move. At random positions in the rooms no hop may become worse.
+/// A relay's room is an interval of x. At random positions in the rooms no hop may become worse.
 #[test]
 fn relays_fly_over_the_terrain_by_themselves() {
     let folder = tempfile::tempdir().unwrap();
@@ -237,7 +237,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
         let how = (PlannedMethod::Align, 1e-4);
         let flight = Flight::new(&own, &elevation, &by_themselves.plan, how, false).unwrap();
         for (relay, (place, _)) in flight.relays.iter().zip(&by_themselves.plan.places) {
-            // The tolerance on the SIR is 1e-4.
+            // The SIR has a relative tolerance of 1e-4, so the positions differ slightly.
             let off_m = (relay.x_m - place.x_m).abs();
             assert!(off_m < 0.5, "seed {seed}: {relay:?} {place:?}");
             assert_eq!(relay.altitude_m.to_bits(), place.altitude_m.to_bits());
@@ -251,7 +251,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
             assert_eq!(is_warned, relay.room_m.is_none(), "seed {seed}: {relay:?}");
             confined += u32::from(is_warned);
         }
-        // Warnings of ways: the height above the ground, found again along the level way.
+        // Paths reported as too low: the height above the ground is computed again on the level path.
         for line in flight.without.iter().filter_map(|one| one.problem.as_ref()) {
             for part in line
                 .split("; ")
@@ -285,7 +285,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
             None => clear += 1,
         }
         assert_eq!(flight.without.len(), usize::from(relays));
-        // The loss of a relay leaves the chain of the others, unless too few are left to agree.
+        // After a loss the other relays form a chain, unless too few are left to agree.
         for lost in flight.without.iter().filter(|_| relays > 2) {
             let mut others = own.clone();
             let left = own.relays.iter().filter(|(index, _)| **index != lost.lost);
@@ -306,7 +306,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
         for _ in 0..50 {
             let somewhere = flight.relays.iter().map(|relay| {
                 let [from, to] = relay.room_m.unwrap_or([f64::from(relay.x_m); 2]);
-                // Often at the ends of the room, and as low as the error allows.
+                // Often an end of the room. The altitude is as low as the position error allows.
                 let x_m = match rng.random_range(0..4) {
                     0 => from,
                     1 => to,
@@ -403,7 +403,7 @@ fn a_blocked_plan_is_refused_with_the_hop_the_place_and_the_metres() {
     let (status, json, line) = run(&format!(
         "--scenario {EXAMPLE} --uavs 6 --allow-blocked --json {files}"
     ));
-    // A relay below the ground is not accepted.
+    // --allow-blocked does not accept a relay below the ground.
     assert!(
         status == Some(1) && line.contains("relay 1 is -13.0 m, ") && !line.contains("blocked"),
         "{line}"
@@ -452,7 +452,7 @@ fn a_blocked_plan_is_refused_with_the_hop_the_place_and_the_metres() {
             .unwrap()
             .len()
     );
-    // The summit of the example.
+    // This is the summit of the example's hills.
     assert!(
         heights
             .iter()
@@ -512,7 +512,7 @@ fn positions_over_terrain_are_reported_with_their_gain() {
     );
 }
 
-/// Checks SIRs with interferers on hills against SIRs computed from the heights of the hills.
+/// Checks SIRs with interferers on hills. They are computed again from the heights of the hills.
 #[test]
 fn interferers_stand_on_the_ground() {
     let folder = tempfile::tempdir().unwrap();
@@ -545,7 +545,7 @@ fn interferers_stand_on_the_ground() {
     let elevation = elevation(&scenario);
     let known = over_terrain::best(&scenario, &elevation, 3, 1e-4).unwrap();
     let report = elevation.report(&scenario, &known).unwrap();
-    // The third one is not covered.
+    // The elevation files do not cover the third interferer.
     assert_eq!(report.interferers[2].altitude_m, None);
     assert!(
         report
@@ -570,7 +570,7 @@ fn interferers_stand_on_the_ground() {
         each.map(|(w, sx, sy, sz)| w / free((x - sx).hypot(*sy).hypot(amsl - sz)))
             .sum()
     };
-    // Eight relays at 150 m pass close to the first one.
+    // Eight relays at 150 m pass close to the first interferer.
     let ask = PlanRequest {
         number: Number::Of(8),
         free_altitude: false,
@@ -589,7 +589,7 @@ fn interferers_stand_on_the_ground() {
         for (hop, (x, amsl)) in report.hops.iter().zip(relays) {
             let signal = from.2 / free((x - from.0).hypot(amsl - from.1));
             let sir_db = 10.0 * (signal / heard(x, amsl)).log10() - hop.diffraction_db;
-            // The heights of the raster are within some metres of the hill's.
+            // The heights in the file differ from the hill's by some metres.
             let (own_db, hop_db) = (hop.sir_db, hop.diffraction_db);
             assert!((own_db - sir_db).abs() < 0.3, "{own_db} {sir_db}");
             let flat: f64 = sources
@@ -616,7 +616,7 @@ fn interferers_stand_on_the_ground() {
         (sir / all - 1.0).abs() < 1e-12 && chain.len() == 3,
         "{sir} {all}"
     );
-    // An area: the nearest altitude of its ground.
+    // For an area, the altitude of its ground nearest to the receiver's altitude counts.
     let scenario = read(
         "[[interferer]]\npower_w = 3\narea = { circle = [2000.0, -400.0, 200.0] }\nmast_m = 5\n",
     );
@@ -673,7 +673,7 @@ fn long_lines_have_relays_on_narrow_hilltops() {
     let elevation = elevation(&scenario);
     let plan = over_terrain::best(&scenario, &elevation, 12, 1e-4).unwrap();
     let report = elevation.report(&scenario, &plan).unwrap();
-    // The interferer is not covered. Without the highest ground of each column a hop is blocked.
+    // The files do not cover the interferer. Without candidates on hilltops a hop would be blocked.
     assert!(report.interferers[0].altitude_m.is_none());
     assert!(
         elevation.problem(&report, false).is_none(),
@@ -682,7 +682,7 @@ fn long_lines_have_relays_on_narrow_hilltops() {
     );
 }
 
-/// Checks that the planner takes the ground as higher by the assumed error of the terrain's heights.
+/// Checks that the ground counts as higher by the assumed error of the heights.
 #[test]
 fn the_error_of_the_heights_is_a_margin() {
     let folder = tempfile::tempdir().unwrap();
@@ -725,7 +725,7 @@ fn the_error_of_the_heights_is_a_margin() {
                 .iter()
                 .all(|relay| relay.above_ground_m >= 37.99)
     );
-    // In its room a relay is neither too low, with the error of the heights, nor too high.
+    // In its room a relay is neither too low, with the assumed error of the heights, nor too high.
     let own = with_altitudes(&unsure, &raised, &careful, 1e-4).unwrap();
     let flown = flown(&own, 4, PlannedMethod::Align, 1e-4).unwrap();
     let how = (PlannedMethod::Align, 1e-4);
@@ -782,7 +782,7 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
         "{flight}"
     );
     let without = flight["without"].as_array().unwrap();
-    // Its last hop would be blocked.
+    // After the loss of relay 1 the last hop would be blocked.
     let blocked = without[0]["problem"].as_str().unwrap();
     assert!(
         blocked.starts_with("hop 4 (relay 4 to Rx) is blocked: the ground at x = 4399 m"),
@@ -829,13 +829,13 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
         page.contains("room over the terrain: x ") && page.contains(blocked),
         "{page}"
     );
-    // The mission's band is no room over the terrain, and is not called one.
+    // The mission's range of altitudes ignores the terrain. The page must not call it a room.
     assert!(
         page.contains("altitude 20.0 to 160.0 m above the line from Tx to Rx; these limits consider neither the ground nor no-fly areas")
             && !page.contains("box:"),
         "{page}"
     );
-    // The terrain is not below this scenario's own altitudes.
+    // At its own altitudes the scenario has relays below the terrain.
     let low = std::fs::read_to_string(&plan).unwrap();
     let low = low.split("\n[[relay]]").next().unwrap();
     std::fs::write(&plan, low).unwrap();
@@ -916,7 +916,7 @@ fn rooms_keep_out_of_no_fly_areas_and_accepted_hops_are_named() {
         )
     };
     assert_eq!(rooms("").0, between(low, high));
-    // The position error is 1 m: the area counts if it is nearer than that.
+    // The position error is 1 m, so an area counts up to 1 m away.
     let before = low + 0.25 * (x - low);
     assert!(x - before > 6.0, "{low} {x} {high}");
     let cut = between(before + 1.0, high);
@@ -931,14 +931,14 @@ fn rooms_keep_out_of_no_fly_areas_and_accepted_hops_are_named() {
     ] {
         assert_eq!(rooms(&zone).0, *expected, "{zone}");
     }
-    // Less than the position error beside the relay.
+    // The area begins less than the position error from the relay.
     let (room, line) = rooms(&zone(x + 0.5, x + 5.0, -60.0, 0.0));
     let part = format!(
         "warning: relay {} has no room: it is in no_fly[0] (0 to 10000 m) within the position error of 1 m (companion.position_error_m)",
         at + 1
     );
     assert!(room == "none" && line.contains(&part), "{room} {line}");
-    // A blocked hop that is accepted is named each time, and the next command accepts it.
+    // An accepted blocked hop is reported each time. The suggested next command accepts it, too.
     let three = path("three.toml");
     let (status, table, line) = run(&format!(
         "--scenario {EXAMPLE} --uavs 3 --altitude terrain --allow-blocked --out {three}"
@@ -968,13 +968,13 @@ fn rooms_keep_out_of_no_fly_areas_and_accepted_hops_are_named() {
     );
 }
 
-/// Checks that drones return above the ground, too.
+/// Checks that the altitudes for the return to launch are above the ground, too.
 #[test]
 fn drones_return_above_the_ground_beside_the_chain() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
     let cell = 1.0 / 3600.0;
-    // A single height of 900 m, 43 m north of the line, in a plain of 500 m with a pit of 450 m.
+    // A peak of 900 m at one grid point, 43 m north of the line Tx-Rx. The plain has 500 m, and a pit of 450 m.
     let north = 47.2 + 10.4 * cell;
     let raster = Raster::geographic(8.49, north, cell, [200, 21]);
     raster.write(&folder.path().join("plain.tif"), |lon, lat| {
@@ -1014,7 +1014,7 @@ fn drones_return_above_the_ground_beside_the_chain() {
             .find(|line| line.contains("RTL_RETURN_ALT"))
             .unwrap();
         let return_m: f64 = own.split('\t').nth(3).unwrap().parse().unwrap();
-        // From the pit it is still above the top.
+        // Also from the pit the altitude is above the peak.
         assert!(450.0 + return_m >= 910.0 && return_m < 520.0, "{own}");
         let page = read("page.txt");
         let said = format!("return to launch: {return_m:.0} m above home");
@@ -1024,7 +1024,7 @@ fn drones_return_above_the_ground_beside_the_chain() {
         );
         assert!(read("ardupilot.parm").contains(&format!("RTL_ALT,{}\n", 100.0 * return_m)));
     }
-    // Without terrain they return above the chain.
+    // Without terrain drones return above the chain.
     let (plain, _) = text.split_once("[terrain]").unwrap();
     let (_, interferer) = text.split_once("mast_m = 10\n").unwrap();
     std::fs::write(path("flat.toml"), format!("{plain}{interferer}")).unwrap();
@@ -1041,7 +1041,7 @@ fn drones_return_above_the_ground_beside_the_chain() {
     assert!(px4.contains("RTL_RETURN_ALT\t110\t"), "{px4}");
 }
 
-/// Checks that a plan says without `--out`, too, whether its relays can fly it.
+/// Checks that a plan without `--out` also says if its relays can fly to it.
 #[test]
 fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -1061,7 +1061,7 @@ fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
     assert_eq!(report["flight"]["relays"].as_array().unwrap().len(), 3);
     let (status, _, line) = of("--uavs 3 --allow-blocked");
     assert_eq!((status, line.as_str()), (Some(0), ""));
-    // The same flight as with a file.
+    // The simulated flight is the same with and without a file.
     let [(status, json, _), (_, written, _)] =
         [String::new(), format!(" --out {}", path("four.toml"))]
             .map(|out| of(&format!("--uavs 4 --json{out}")));
@@ -1069,7 +1069,7 @@ fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
         [json, written].map(|json| -> Value { serde_json::from_str(&json).unwrap() });
     assert_eq!(status, Some(0));
     assert!(alone["flight"].is_object() && alone == written, "{alone}");
-    // Relays that compute with one hypothetical interferer fly to other positions than those of the plan.
+    // Relays that use one hypothetical interferer fly to other positions than the planned ones.
     let text = std::fs::read_to_string(EXAMPLE).unwrap();
     let hills = std::path::absolute("../../examples/hills.tif").unwrap();
     let text = text.replace("hills.tif", hills.to_str().unwrap());
@@ -1100,7 +1100,7 @@ fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
         .zip(flown)
         .map(|(plan, flown)| (x(plan) - x(flown)).abs());
     assert!(off_m.fold(0.0, f64::max) > 1.0, "{json} {line}");
-    // An area has no position with which relays could compute.
+    // Relays cannot compute with an area: it has no single position.
     let area = "[[interferer]]\npower_w = 2.0\narea = { circle = [2000, 1500, 200] }\n";
     std::fs::write(path("area.toml"), format!("{sections}{area}")).unwrap();
     let area = format!(

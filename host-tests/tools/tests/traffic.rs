@@ -1,4 +1,4 @@
-//! Promised data rates are delivered: the planner's rates against packets through simulated chains.
+//! Planned data rates are delivered: packets are sent through simulated chains.
 //!
 //! `COUNT` and `SEED` in the environment set the number of scenes and the first seed.
 #![allow(
@@ -121,7 +121,7 @@ impl Case {
         [&plan.sirs, &back].map(|sirs| self.radio.chain_bps(sirs) / 2.0)
     }
 
-    /// Returns the planner's plan with the largest data rate for this case.
+    /// Returns the plan with the largest data rate for this case.
     fn planned(&self) -> Plan {
         let ask = self.request(Number::Of(self.relays));
         match Carried::new(&self.scenario, &ask, &self.radio, self.relays) {
@@ -175,9 +175,9 @@ impl Case {
             .unwrap()
     }
 
-    /// Simulates a chain of `relays` relays that carries packets, toward Rx or in `both` directions.
+    /// Simulates a chain of `relays` relays that carries packets, to Rx or in `both` directions.
     ///
-    /// `offered_bps` are the data rates offered; `None` for the rates that the chain promises.
+    /// `offered_bps` are the offered data rates; `None` for the rates that the chain can carry.
     fn send(&self, relays: u16, both: bool, offered_bps: Option<[f64; 2]>) -> Traffic {
         let (mission, profiles) = mission::mission(&self.scenario, relays, TOLERANCE).unwrap();
         let setup = Setup {
@@ -186,7 +186,7 @@ impl Case {
             ..Setup::new(mission)
         };
         let hops = TrueHops::new(&self.scenario, &setup, &mission);
-        // Slow chains send small packets, so that the traffic ends in time.
+        // Slow chains send small packets, so that the simulation takes less time.
         let places = plan(&self.scenario, &self.request(Number::Of(relays))).unwrap();
         let rates = self
             .both_bps(&places)
@@ -210,11 +210,11 @@ impl Case {
     }
 }
 
-/// Checks the data rate that a flow has delivered. Returns it as a fraction of the planner's rate `promised_bps`.
+/// Checks a flow's delivered data rate, and returns it as a fraction of `promised_bps`.
 ///
 /// Every offered packet must be delivered, dropped, lost or queued. The delivered rate must not exceed the rate at the
-/// agreed positions. It may exceed the planner's rate by the fraction `most`, because the agreed positions differ
-/// slightly from the planned ones.
+/// agreed positions. It may exceed the planner's rate `promised_bps` by the fraction `most`, because the agreed
+/// positions differ slightly from the planned ones.
 fn share(flow: &Flow, promised_bps: f64, most: f64, what: &str) -> f64 {
     let packets = flow.packets;
     let gone = packets.delivered + packets.dropped + packets.lost + flow.queued;
@@ -244,7 +244,7 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
         carried += u32::from(promised_bps > 0.0);
         let sent = case.send(case.relays, false, None);
         worst = worst.min(share(&sent.flows[0], promised_bps, TOLERANCE, &what));
-        // More is offered than promised: no more passes.
+        // More is offered than the chain can carry. The delivered rate stays the same.
         let sent = case.send(case.relays, false, Some([1.5 * promised_bps; 2]));
         if promised_bps > 0.0 {
             worst = worst.min(share(&sent.flows[0], promised_bps, TOLERANCE, &what));
@@ -257,7 +257,7 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
             let what = format!("{what}, both ways");
             worst = worst.min(share(flow, promised_bps, most, &what));
         }
-        // A target rate is met by the number of relays that the planner names.
+        // The number of relays that the planner names carries the target rate.
         if seed % 5 == 0 && promised_bps > 0.0 && case.scenario.relays.is_empty() {
             let target_bps = 0.9 * promised_bps;
             let ask = case.request(Number::Of(1));
@@ -277,8 +277,9 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
     assert!(carried > 0);
 }
 
-/// Checks that simulated chains at the planned positions deliver the planner's data rates. The chains are planned for
-/// both directions, or for time slots as long as each hop needs.
+/// Checks that simulated chains at the planned positions deliver the planned data rates.
+///
+/// The chains are planned for both directions, or for fitted time slots (as long as each hop needs).
 fn every_plan_is_kept(access: Access, has_steps: bool) {
     let first = number("SEED", 1);
     let (mut worst, mut carried) = (1.0_f64, 0);

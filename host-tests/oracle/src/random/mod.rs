@@ -1,4 +1,4 @@
-//! Random scenarios for property tests, weighted toward the places where formulas break.
+//! Random scenarios for property tests. Many are close to the values at which formulas break.
 //!
 //! | quantity | distribution |
 //! | --- | --- |
@@ -24,7 +24,7 @@ use rand::{Rng, RngExt};
 
 use crate::reference::{Link, Relay, path_loss_factor};
 
-/// Differences between the relays of a random chain.
+/// Kind of differences between the relays of a random chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Chain {
     /// Relays with the same power and altitude.
@@ -33,13 +33,13 @@ pub enum Chain {
     OwnPower,
     /// Relays that differ in altitude.
     OwnAltitude,
-    /// Relays that differ in power and altitude.
+    /// Relays that differ in both power and altitude.
     Own,
-    /// Random choice for each link: identical relays in half of the links, each other kind in a sixth.
+    /// Random choice for each link: equal relays in half of the links, each other kind in a sixth.
     Any,
 }
 
-/// Kind of random links to draw: number of relays, and differences between them.
+/// Kind of random links: number of relays, and differences between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Style {
     /// Smallest and largest number of relays, >= 1.
@@ -49,19 +49,19 @@ pub struct Style {
 }
 
 impl Style {
-    /// Links with 1 to 50 relays of equal altitude and power.
+    /// Links of 1 to 50 equal relays.
     pub const ALIKE: Self = Self {
         relays: 1..=50,
         chain: Chain::Alike,
     };
-    /// Chains of 1 to 50 relays; altitudes and powers of the relays can differ.
+    /// Links of 1 to 50 relays, equal or different.
     pub const ANY: Self = Self {
         relays: 1..=50,
         chain: Chain::Any,
     };
 }
 
-/// Draws a random link; the distribution is in the module's table.
+/// Draws a random link by the module's table.
 pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     let distance_m = log_uniform(rng, 10.0, 1e5);
     let altitude_m = bounded(log_uniform(rng, 0.002, 0.5) * distance_m);
@@ -91,8 +91,9 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     }
 }
 
-/// Returns the link with added receiver noise. The noise is 1e-6 to 1e4 times the interference at a random position,
-/// within the limit of a mission.
+/// Returns `link` with added receiver noise.
+///
+/// The noise is 1e-6 to 1e4 times the interference at a random position, within the limit of a mission.
 pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     let place = rng.random_range(0.0..=link.distance_m);
     let altitude_m = link.relays.first().map_or(1.0, |relay| relay.altitude_m);
@@ -105,8 +106,9 @@ pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     }
 }
 
-/// Returns and prints the seed of a random test. It is the environment variable `SEED`, or `default` if this variable
-/// is not a number.
+/// Returns and prints the seed of a random test.
+///
+/// It is the environment variable `SEED`, or `default` if that is not a number.
 pub fn seed(default: u64) -> u64 {
     let seed = std::env::var("SEED")
         .ok()
@@ -116,8 +118,9 @@ pub fn seed(default: u64) -> u64 {
     seed
 }
 
-/// Returns the number of random problems in a test. It is the environment variable `COUNT`, or `usual` if this
-/// variable is not a number.
+/// Returns the number of random problems in a test.
+///
+/// It is the environment variable `COUNT`, or `usual` if that is not a number.
 pub fn count(usual: usize) -> usize {
     let count = std::env::var("COUNT").ok();
     count.and_then(|text| text.parse().ok()).unwrap_or(usual)
@@ -173,7 +176,7 @@ fn along(rng: &mut impl Rng, d: f64) -> f64 {
     }
 }
 
-/// Draws the interferer's distance from the line Tx-Rx, as a fraction of the distance from Tx to Rx.
+/// Draws the interferer's distance from the line Tx-Rx, as a fraction of the distance Tx-Rx.
 fn aside(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..100) {
         0..25 => 0.0,

@@ -2,11 +2,12 @@
 
 use super::link::{Link, meets, received_w};
 
-/// Number of bisection steps. It is enough to halve any f64 interval until its ends are adjacent f64 numbers.
+/// Number of bisection steps. Any f64 interval needs fewer steps until its ends are adjacent numbers.
 const HALVINGS: usize = 200;
 
-/// Hop to a relay from Tx or from the previous relay. The argument `x` of its methods is the position of the receiving
-/// relay, m.
+/// Hop from a fixed sender to a relay.
+///
+/// The sender is Tx or the previous relay. The argument `x` of the methods is the x of the receiving relay, m.
 pub(super) struct Hop<'a> {
     link: &'a Link,
     sender_w: f64,
@@ -17,7 +18,7 @@ pub(super) struct Hop<'a> {
 }
 
 impl<'a> Hop<'a> {
-    /// Creates the hop to relay `k`, 1 to N, from the previous relay at `from_x`. For `k` = 1 the sender is Tx, at 0.
+    /// Creates the hop to relay `k`, 1 to N, from the previous relay at `from_x`. For `k` = 1, Tx at 0 sends.
     pub(super) fn new(link: &'a Link, k: usize, from_x: f64) -> Option<Self> {
         let before = k.checked_sub(1)?;
         let own_h = link.relays.get(before)?.altitude_m;
@@ -43,7 +44,7 @@ impl<'a> Hop<'a> {
         )
     }
 
-    /// Returns the hop's SIR (linear) with the receiving relay at `x`: signal / (interference + noise).
+    /// Returns the hop's linear SIR, with the receiver at `x`: signal / (interference + noise).
     pub(super) fn sir(&self, x: f64) -> f64 {
         let signal = received_w(
             self.sender_w,
@@ -71,10 +72,9 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// Returns a value that is positive where the SIR rises with `x`, and negative where it falls. The extrema of the
-    /// SIR are its zeros.
+    /// Returns a value with the sign of the SIR's slope along `x`. Its zeros are the extrema of the SIR.
     ///
-    /// Beyond the sender the value is a concave function of `x` (see [`super`]), so that it has at most two zeros.
+    /// Beyond the sender the value is a concave function of `x` (see [`super`]), so it has at most two zeros.
     fn rise(&self, x: f64) -> f64 {
         let (dx, dh) = (x - self.sender_x, self.own_h - self.sender_h);
         let (ix, iy, ih) = (x - self.link.x_i, self.link.y_i, self.own_h);
@@ -86,7 +86,7 @@ impl<'a> Hop<'a> {
     }
 
     fn rises(&self, x: f64) -> bool {
-        // At the sender's own position and altitude the SIR is infinite, so from there it falls.
+        // At the sender's own position and altitude the SIR is infinite, so it falls from there on.
         if x > self.sender_x {
             self.rise(x) > 0.0
         } else {
@@ -94,11 +94,10 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// Returns the positions, m, at which the SIR has a maximum or minimum, in ascending order. There are at most two.
-    /// They are within `low` to `high`, which must not be before the sender.
+    /// Returns the x, m, of the SIR's extrema from `low` to `high`, ascending; at most two.
     ///
-    /// The SIR is monotone between these positions. The cost is about 60 evaluations of the slope, with receiver noise
-    /// about 300.
+    /// The SIR is monotone between them. `low` must not be before the sender. The cost is about 60 evaluations of the
+    /// slope, with receiver noise about 300.
     pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
         let (first, last) = (self.rises(low), self.rises(high));
         let sign = |from: f64, to: f64| bisect(from, to, |x| self.rises(x) == self.rises(from));
@@ -108,7 +107,7 @@ impl<'a> Hop<'a> {
         if first || !(self.link.noise_w > 0.0) {
             return Vec::new();
         }
-        // It may rise in between, around the maximum of a concave function.
+        // The SIR may rise in between, around the maximum of a concave function.
         let (mut from, mut to) = (low, high);
         for _ in 0..HALVINGS {
             let third = (to - from) / 3.0;
@@ -134,11 +133,10 @@ impl<'a> Hop<'a> {
     }
 }
 
-/// Returns the x, m, between `inside` and `outside` at which `holds` changes from true to false. `outside` may be
-/// smaller than `inside`.
+/// Returns the last x, m, from `inside` toward `outside` at which `holds` is still true.
 ///
-/// `holds` must be true at `inside`, false at `outside`, and change once. At the returned x it is still true. The
-/// result is exact to adjacent f64 values.
+/// `outside` may be smaller than `inside`. `holds` must be true at `inside`, false at `outside`, and change once. The
+/// result is exact to adjacent f64 numbers.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = inside.midpoint(outside);

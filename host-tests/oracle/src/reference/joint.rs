@@ -1,28 +1,28 @@
 //! The joint problem: positions in a corridor along Tx-Rx that maximise the worst hop's SIR.
 //!
-//! 0 <= `x_1` <= ... <= `x_N` <= D, every relay within one [`Corridor`] (except relays with a fixed cross-section position), and
-//! neighbours at least the link's minimum separation apart. Here chains are evaluated and checked; their optima are recorded, see
-//! [`crate::recorded`].
+//! 0 <= `x_1` <= ... <= `x_N` <= D, every relay within one [`Corridor`] (except relays with a fixed cross-section
+//! position), and neighbours at least the link's minimum separation apart. This module evaluates and checks chains.
+//! Optima are in [`crate::recorded`].
 //!
-//! The SIR is computed from received powers at the positions: never more than can be flown.
+//! The SIR is computed from the received powers at the positions, so it is never higher than in flight.
 
 use super::link::{Link, received_w};
 
-/// Limits of the relays' positions across the line Tx-Rx: ranges of altitude and of lateral position.
+/// Limits of the relays' altitudes and lateral positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
-    /// Lowest altitude of a relay, m, > 0. All altitudes are above the ground on which Tx, Rx and the interferer are.
+    /// Lowest altitude of a relay, m, > 0. Altitudes count from the ground; Tx, Rx and interferer are there.
     pub least_m: f64,
     /// Highest altitude of a relay, m, >= `least_m`.
     pub most_m: f64,
-    /// Smallest lateral position y of a relay, m; seldom > 0.
+    /// Smallest lateral position y of a relay, m; seldom above 0.
     pub left_m: f64,
     /// Largest lateral position y of a relay, m, >= `left_m`.
     pub right_m: f64,
 }
 
 impl Corridor {
-    /// Creates a corridor without width: the vertical plane through Tx and Rx, between two altitudes.
+    /// Creates a corridor without width: altitudes from `least_m` to `most_m`, and lateral position 0.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,
@@ -32,7 +32,7 @@ impl Corridor {
         }
     }
 
-    /// Returns true if a position is inside the corridor, with a tolerance of `slack_m`.
+    /// Returns true if `place` is inside the corridor, or outside by at most `slack_m`.
     pub fn contains(&self, place: &Place, slack_m: f64) -> bool {
         let within =
             |low: f64, value: f64, high: f64| (low - slack_m..=high + slack_m).contains(&value);
@@ -41,21 +41,21 @@ impl Corridor {
     }
 }
 
-/// Relay whose lateral position and altitude are fixed, inside the corridor or outside of it.
+/// Relay with a fixed lateral position and altitude, inside or outside of the corridor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedCrossSection {
     /// Index of the relay in the link, from 0.
     pub relay: usize,
-    /// Fixed lateral position, the offset from the vertical plane through Tx and Rx, m.
+    /// Fixed lateral position: the offset from the vertical plane through Tx and Rx, m.
     pub y_m: f64,
     /// Fixed altitude of the relay, m, > 0.
     pub altitude_m: f64,
 }
 
 impl FixedCrossSection {
-    /// Returns the range of lateral positions and altitudes of one relay, called its corridor.
+    /// Returns the limits of the altitude and lateral position of one relay.
     ///
-    /// The range is a single point if `held` fixes the lateral position and altitude of the relay.
+    /// They are a single point if `held` fixes them for this relay.
     pub(crate) fn corridor_of(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
         let own = held.iter().find(|hold| hold.relay == relay);
         own.map_or(corridor, |hold| Corridor {
@@ -70,10 +70,11 @@ impl FixedCrossSection {
 /// Position of a relay in the reference model of the joint method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Coordinate along the line from Tx to Rx, m: 0 to the distance D.
+    /// Distance from Tx toward Rx, m: 0 to the distance D.
     pub x_m: f64,
-    /// Lateral offset from the vertical plane through Tx and Rx, m. Positive on the side on which an interferer with
-    /// a positive `y_i` is.
+    /// Lateral offset from the vertical plane through Tx and Rx, m.
+    ///
+    /// It is positive on the side of an interferer with a positive `y_i`.
     pub y_m: f64,
     /// Altitude of the relay, m.
     pub altitude_m: f64,
@@ -96,8 +97,9 @@ impl Place {
     }
 }
 
-/// Returns the SIR (linear) of a chain's worst hop. `None` if the link has no relays, or if the number of positions
-/// differs from the number of relays.
+/// Returns the linear SIR of a chain's worst hop.
+///
+/// `None` if the link has no relays, or if the number of positions differs from the number of relays.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     let (tail, last) = (places.last()?, link.relays.last()?);
     if places.len() != link.len() {
@@ -130,8 +132,9 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     Some(hops.fold(rx, f64::min))
 }
 
-/// Returns true if a chain keeps the relays' order, corridor, fixed positions and minimum separation. A separation is
-/// accepted if it is short by less than 1e-9 of the minimum, because of rounding.
+/// Returns true if a chain keeps the order, the corridor, fixed positions and the minimum separation.
+///
+/// A distance may be below the minimum separation by less than 1e-9 of it, because of rounding.
 pub fn keeps_rules(
     link: &Link,
     corridor: Corridor,

@@ -3,7 +3,7 @@
 /// Relay in a reference link: altitude and transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
-    /// Altitude of the relay, m, > 0, above the ground on which Tx, Rx and the interferer are.
+    /// Altitude of the relay above the ground, m, > 0. Tx, Rx and interferer are on the ground.
     pub altitude_m: f64,
     /// Transmit power of the relay, W, > 0.
     pub power_w: f64,
@@ -20,9 +20,11 @@ pub struct Link {
     pub tx_w: f64,
     /// Transmit power of the interferer, W, > 0.
     pub interferer_w: f64,
-    /// Interferer's coordinate along Tx-Rx, m; any finite value.
+    /// Position x of the interferer, m; any finite value.
     pub x_i: f64,
-    /// Interferer's offset from the vertical plane through Tx and Rx, m; any finite value.
+    /// Lateral position y of the interferer, m; any finite value.
+    ///
+    /// It is the offset from the vertical plane through Tx and Rx.
     pub y_i: f64,
     /// Path-loss factor between two relays, 1/m^2, > 0.
     pub mu_los: f64,
@@ -46,8 +48,9 @@ pub fn path_loss_factor(carrier_hz: f64, excess: f64) -> f64 {
 }
 
 impl Link {
-    /// Returns the paper's multi-hop scenario with `n` relays of 1 W at 20 m. Tx and interferer have 80 W, the
-    /// interferer is at (500, 400) m, and Rx is 1 km from Tx.
+    /// Returns the paper's multi-hop scenario with `n` relays of 1 W at 20 m.
+    ///
+    /// Tx and interferer have 80 W. The interferer is at (500, 400) m, and Rx is 1 km from Tx.
     pub fn paper(n: usize) -> Self {
         let mu_los = path_loss_factor(2e9, 10_f64.powf(0.01));
         Self {
@@ -82,16 +85,17 @@ impl Link {
     }
 }
 
-/// Returns the received power, W: `power_w` / (`factor` distance^2). `dx`, `dy` and `dz` are the parts of the
-/// distance, m.
+/// Returns the received power, W: `power_w` / (`factor` d^2).
+///
+/// d is the length of the offset (`dx`, `dy`, `dz`), m.
 pub(super) fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }
 
-/// Returns true if `sir` meets `target`. An `sir` that is a few units in the last place below `target` meets it, too.
+/// Returns true if `sir` is at least `target`, apart from rounding.
 ///
-/// This tolerance is needed if the interferer is at Tx: the SIR is then constant and can equal the target, so that
-/// rounding would decide.
+/// With the interferer at Tx the SIR is constant and can equal the target; rounding would decide without this
+/// tolerance.
 pub(super) fn meets(sir: f64, target: f64) -> bool {
     sir >= target * (1.0 - 4.0 * f64::EPSILON)
 }

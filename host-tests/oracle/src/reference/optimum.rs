@@ -1,9 +1,9 @@
-//! The best target of a chain, by bisection, and the paper's fixed-step schedule.
+//! Best target SIR of a chain: by bisection, and by the paper's fixed steps.
 
 use super::hop::Hop;
 use super::link::Link;
 
-/// Relative width of the interval at which the bisection for the best target SIR ends.
+/// Relative width of the interval of target SIRs at which the bisection ends.
 const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
@@ -11,9 +11,9 @@ const LEAST_TARGET: f64 = 1e-250;
 impl Link {
     /// Returns the best SIR (linear) of all chains: the largest target SIR that a chain meets.
     ///
-    /// The result is accurate to 1e-13 relative. `None` without relays, or if every chain has an SIR of zero. About 50
-    /// to 60 targets are tried. If all relays share one altitude, a target is tried with one chain only, in which every
-    /// relay is as near to Rx as possible. Otherwise all positions of each relay are considered.
+    /// Accurate to 1e-13 relative. `None` without relays, or if every chain has an SIR of zero. About 50 to 60 targets
+    /// are tried. If all relays share one altitude, only the chain with every relay as near to Rx as possible is tried.
+    /// Otherwise all positions of each relay are considered.
     pub fn optimum(&self) -> Option<f64> {
         let mut heights = self.relays.iter().map(|relay| relay.altitude_m);
         let first = heights.next()?;
@@ -24,18 +24,17 @@ impl Link {
         }
     }
 
-    /// Returns the largest target SIR (linear) that a bisection with [`Link::feasible`] finds. It is accurate to 1e-13
-    /// relative.
+    /// Returns the largest target SIR (linear) that a bisection with [`Link::feasible`] finds.
     ///
-    /// If all relays share one altitude, the result is the optimum. Otherwise it may be below the optimum, because the
-    /// greedy chain can fail at one target and succeed at a larger one. `None` without relays, or if every chain has an
-    /// SIR of zero.
+    /// Accurate to 1e-13 relative. If all relays share one altitude, it is the optimum. Otherwise it may be lower,
+    /// because the greedy chain can miss one target and meet a larger one. `None` without relays, or if every chain has
+    /// an SIR of zero.
     pub fn farthest_optimum(&self) -> Option<f64> {
         self.largest_target(|target| self.feasible(target).is_some())
     }
 
     pub(super) fn largest_target(&self, feasible: impl Fn(f64) -> bool) -> Option<f64> {
-        // No chain is better than the best SIR of its first hop.
+        // No chain is better than its first hop at the best position.
         let mut above = 2.0 * Hop::new(self, 1, 0.0)?.peak(0.0, self.distance_m);
         let mut below = above / 16.0;
         while !feasible(below) {
@@ -56,11 +55,11 @@ impl Link {
         Some(below)
     }
 
-    /// Returns the first target SIR (linear) that the paper's fixed-step search tries.
+    /// Returns the first target SIR (linear) of the paper's fixed-step search.
     ///
-    /// It is the smaller of two SIRs. One is the SIR of the first hop with relay 1 straight above Tx. The other is the
-    /// SIR of the last hop with relay N straight above Rx. If the interferer is behind Tx (its x is below 0), the first
-    /// SIR is instead the largest SIR of the first hop over all x from 0 to D.
+    /// It is the smaller of two SIRs: of the first hop with relay 1 straight above Tx, and of the last hop with relay N
+    /// straight above Rx. If the interferer is behind Tx (x below 0), the first SIR is instead the largest one of the
+    /// first hop.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {
@@ -73,10 +72,12 @@ impl Link {
 
     /// Runs the paper's fixed-step search: lowers the target SIR by `epsilon` until a chain meets it.
     ///
-    /// Returns the number of targets tried and the last target (linear). `None` if no target can be met. The first
-    /// target is the smaller of two SIRs. One is the SIR of the first hop with relay 1 straight above Tx, or the best
-    /// SIR of this hop if the interferer is behind Tx (x below 0). The other is the SIR of the last hop with relay N
-    /// straight above Rx. Each target costs one chain. `epsilon` is linear, > 0.
+    /// Returns the number of targets tried and the last target (linear). `None` if no target can be met. `epsilon` is
+    /// linear, above 0. Each target costs one chain.
+    ///
+    /// The first target is the smaller of two SIRs: of the first hop with relay 1 straight above Tx, and of the last
+    /// hop with relay N straight above Rx. If the interferer is behind Tx (x below 0), the first SIR is instead the
+    /// largest one of the first hop.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

@@ -1,13 +1,13 @@
-//! Reach of a single node, and the greedy chain built from it.
+//! Farthest position of a relay, and the greedy chain of such positions.
 
 use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
 
 impl Link {
-    /// Returns the farthest position, m, between `from_x` and Rx at which relay `k` meets the SIR `target`.
+    /// Returns the farthest x from `from_x` to Rx, m, at which relay `k` meets the SIR `target`.
     ///
-    /// `k` is within 1 to N; `target` is linear and above 0. Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None`
-    /// if no position meets the target. The cost is about 60 evaluations of the SIR, at most about 150.
+    /// `k` is within 1 to N; `target` is linear and above 0. Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None` if
+    /// no position meets the target. The cost is about 60 evaluations of the SIR, at most about 150.
     pub fn farthest(&self, k: usize, from_x: f64, target: f64) -> Option<f64> {
         let end = self.distance_m;
         if !(0.0..=end).contains(&from_x) {
@@ -18,7 +18,8 @@ impl Link {
         if meets(end) {
             return Some(end);
         }
-        // At most one crossing is between two turning points, so the farthest is beyond the last one that meets the target.
+        // The SIR crosses the target at most once between two extrema. The farthest x follows the last extremum that
+        // meets it.
         let mut outside = end;
         for inside in hop.turns(from_x, end).into_iter().rev().chain([from_x]) {
             if meets(inside) {
@@ -29,10 +30,10 @@ impl Link {
         None
     }
 
-    /// Returns the largest distance from Rx, m, at which the last relay meets `target` (linear SIR) at Rx. It may
-    /// exceed the distance from Tx to Rx.
+    /// Returns the largest distance from Rx, m, at which the last relay meets the SIR `target` at Rx.
     ///
-    /// `None` if the target is missed even above Rx, or is not positive. The cost is about 60 evaluations of the SIR.
+    /// `target` is linear. The distance may exceed that from Tx to Rx. `None` if the target is missed even above Rx, or
+    /// is not positive. The cost is about 60 evaluations of the SIR.
     pub fn rx_reach(&self, target: f64) -> Option<f64> {
         let sir = |distance: f64| self.sir_rx(self.distance_m - distance);
         let meets = |distance: f64| sir(distance).is_some_and(|sir| meets(sir, target));
@@ -46,12 +47,11 @@ impl Link {
         Some(bisect(0.0, outside, meets))
     }
 
-    /// Returns the positions, m, of the greedy chain for a target SIR (linear). Each relay goes as far as `target`
-    /// allows.
+    /// Returns the positions, m, of the greedy chain: each relay is as far toward Rx as `target` allows.
     ///
-    /// `None` if a relay has no position that meets the target, or if Rx is out of reach of the last relay. Relays use
-    /// the same method in flight. If all relays share one altitude, `None` proves that no chain meets the target;
-    /// otherwise [`Link::placement`] gives this proof. The cost is N calls of [`Link::farthest`].
+    /// `target` is a linear SIR. `None` if a relay has no position that meets it, or if the last relay misses it at Rx.
+    /// Relays use the same method in flight. If all relays share one altitude, `None` proves that no chain meets the
+    /// target. For other chains [`Link::placement`] gives this proof. The cost is N calls of [`Link::farthest`].
     pub fn feasible(&self, target: f64) -> Option<Vec<f64>> {
         let mut from = 0.0;
         let mut x = Vec::with_capacity(self.len());

@@ -1,25 +1,24 @@
-//! Brute-force search over the positions of one or two relays, without targets or reaches.
+//! Brute-force search over the positions of one or two relays, without target SIRs.
 
 use super::link::Link;
 
-/// Number of golden-section steps in one grid cell. They shrink the cell to about 2e-9 of its width.
+/// Number of golden-section steps in a grid cell. They shrink the cell to about 2e-9 of its width.
 const STEPS: usize = 42;
 
 const PEAKS: usize = 4;
 
 impl Link {
-    /// Returns the best SIR (linear) of all chains with the minimum separation, by brute force. The search has one grid
-    /// for each relay, nested in the grid of the previous relay, and refines its best points.
+    /// Returns the best SIR (linear) of all chains that keep the minimum separation, by brute force.
     ///
-    /// The result is 0 if there is no such chain. `points` (>= 16) is the number of grid points per relay. The result
-    /// may be below the optimum, because the grid may miss it. It is never above the optimum, except for rounding.
-    /// Costs about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.
+    /// The search tries a grid of positions for each relay, and refines the best ones. `points` (>= 16) is the number
+    /// of grid points per relay. The result is 0 if there is no such chain. It may be below the optimum, because the
+    /// grid may miss it, but is never above it, except for rounding. The cost is about (4 `points` + 170)^N SIR
+    /// evaluations: use it for N of 1 or 2.
     pub fn optimum_by_search(&self, points: u32) -> f64 {
         self.best_from(1, 0.0, points)
     }
 
-    /// Returns the best SIR of the worst of the hops `k` to N+1. The positions of relay `k` and of all relays after it
-    /// are varied.
+    /// Returns the best SIR of the worst of the hops `k` to N+1, over the positions of relays `k` to N.
     ///
     /// Relay k-1 is fixed at `from_x`; `points` is the number of grid points per relay.
     fn best_from(&self, k: usize, from_x: f64, points: u32) -> f64 {
@@ -36,10 +35,9 @@ impl Link {
         maximum(&self.grid(from, points), worst_hop)
     }
 
-    /// Returns the positions from `from_x` to Rx, m, at which the search evaluates a relay.
+    /// Returns the x from `from_x` to Rx, m, that the search tries for a relay.
     ///
-    /// These are about `points` evenly spaced positions, and further positions that get denser toward `from_x`, Rx
-    /// and the interferer.
+    /// About `points` of them are evenly spaced. Others get denser toward `from_x`, Rx and the interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);
@@ -61,8 +59,9 @@ impl Link {
     }
 }
 
-/// Returns the largest value of `f`. The function is evaluated at the sorted points `x`, and then around the best local
-/// maxima.
+/// Returns the largest value of `f` found.
+///
+/// `f` is evaluated at the sorted points `x`, and then around the best local maxima.
 fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let samples: Vec<(f64, f64)> = x.iter().map(|&x| (x, f(x))).collect();
     let place = |i: Option<usize>| i.and_then(|i| samples.get(i)).copied();

@@ -1,10 +1,12 @@
-//! Exact feasibility for relays at different altitudes: the whole set of positions each node can reach.
+//! Exact feasibility for relays at different altitudes: the set of all possible positions of each node.
 //!
-//! A node's set is a sorted list of closed intervals. A position can be reached if the hop from the *nearest* reachable position
-//! at or before it meets the target: a nearer sender is received more strongly, and the interference at the receiver does not
-//! depend on it. So the next set has two kinds of pieces: positions inside an interval of the last set (sender straight below or
-//! above), and positions in the gap after an interval (sender at the interval's end). A minimum separation shifts both pieces by
-//! the least advance along x.
+//! A set is a sorted list of closed intervals. A position is possible if it meets the target with the nearest possible
+//! sender position at or before it. A nearer sender is received more strongly, and the interference does not depend on
+//! the sender.
+//!
+//! The next set therefore has two kinds of intervals: positions inside an interval of the last set, with the sender
+//! straight below or above; and positions in the gap after an interval, with the sender at the end of this interval. A
+//! minimum separation shifts both kinds by the least advance along x.
 
 use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
@@ -15,8 +17,8 @@ impl Link {
     /// Returns the positions, m, of a chain that meets `target` (linear SIR).
     ///
     /// Each relay is as far toward Rx as possible. The altitudes of the relays may differ. `None` proves that no chain
-    /// meets the target. The positions of a relay that can meet the target form intervals, seldom more than three; each
-    /// costs about 300 SIR evaluations.
+    /// meets the target. The possible positions of a relay are seldom more than three intervals; each costs about 300
+    /// SIR evaluations.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let sets = self.sets(target, 0.0)?;
         let mut limit = self.distance_m;
@@ -29,16 +31,17 @@ impl Link {
         Some(x)
     }
 
-    /// Returns the best SIR (linear) of all chains that keep the minimum separation. Altitudes are fixed. Accurate to
-    /// 1e-13 relative.
+    /// Returns the best SIR (linear) of all chains that keep the minimum separation.
     ///
-    /// `None` without relays, if every chain has an SIR of zero, or if no chain keeps the minimum separation.
+    /// The altitudes are fixed. Accurate to 1e-13 relative. `None` without relays, if every chain has an SIR of zero,
+    /// or if no chain keeps the minimum separation.
     pub fn optimum_apart(&self) -> Option<f64> {
         self.largest_target(|target| self.sets(target, self.min_separation_m).is_some())
     }
 
-    /// Returns the minimum distance along x from relay k-1 to relay `k`, m; 0 for relay 1. Neighbours must be
-    /// `apart_m` apart; their altitudes may differ.
+    /// Returns the minimum distance along x from relay k-1 to relay `k`, m; 0 for relay 1.
+    ///
+    /// The two relays must be `apart_m` apart in space.
     pub(super) fn least_advance(&self, k: usize, apart_m: f64) -> f64 {
         let altitude = |k: usize| Some(self.relays.get(k.checked_sub(1)?)?.altitude_m);
         let pair = altitude(k).zip(k.checked_sub(1).and_then(altitude));
@@ -47,7 +50,7 @@ impl Link {
         })
     }
 
-    /// Returns, for each relay, the positions at which its hop and all earlier hops can meet `target`.
+    /// Returns the positions of each relay at which its hop and all earlier hops can meet `target`.
     ///
     /// Neighbours are at least `apart_m` apart. `None` if no chain meets the target at Rx.
     fn sets(&self, target: f64, apart_m: f64) -> Option<Vec<Vec<Interval>>> {
@@ -60,15 +63,15 @@ impl Link {
             let next = self.next_set(k, sets.last()?, target, self.least_advance(k, apart_m));
             sets.push(next);
         }
-        // The SIR at Rx rises all the way to D, so only the last position of the last set needs to be tried.
+        // The SIR at Rx rises up to D, so the last position of the last set decides.
         let tail = sets.last()?.last()?.1;
         meets(self.sir_rx(tail)?, target).then_some(sets)
     }
 
     /// Returns the positions that relay `k` (2 to N) can have if relay k-1 is within `set`.
     ///
-    /// The hop between the two relays must meet `target`, and relay `k` must be at least `advance` m farther along x
-    /// than relay k-1.
+    /// The hop between the two relays must meet `target`. Relay `k` must be at least `advance` m beyond relay k-1 along
+    /// x.
     fn next_set(&self, k: usize, set: &[Interval], target: f64, advance: f64) -> Vec<Interval> {
         let mut pieces = Vec::new();
         let gap_ends = set
@@ -81,7 +84,8 @@ impl Link {
             if start + advance > self.distance_m {
                 break;
             }
-            // With the sender as close behind as possible the signal is constant: interference is largest abreast.
+            // With the sender as close as possible the signal is constant. The interference is largest beside the
+            // interferer.
             let (low, high) = (start + advance, past(end));
             let abreast = self.x_i.clamp(low, high);
             pieces.extend(where_true(low, &[abreast], high, |x| {
@@ -103,8 +107,8 @@ impl Link {
 
 /// Returns the parts of the interval `low` to `high` in which `holds` returns true.
 ///
-/// `turns` are positions in ascending order. `holds` must change at most once between two neighbouring positions of
-/// `low`, `turns` and `high`.
+/// `turns` are positions in ascending order. `holds` must change at most once between two neighbours of the list `low`,
+/// `turns`, `high`.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
     let corners = || turns.iter().copied().chain([high]);
     let froms = std::iter::once(low).chain(turns.iter().copied());

@@ -4,15 +4,15 @@ use super::hop::Hop;
 use super::link::{Link, received_w};
 
 impl Link {
-    /// Returns the SIR (linear) of hop `k` in 1..=N. Relay `k` is at `x` metres, its sender at `from_x` metres.
+    /// Returns the linear SIR of hop `k`, 1 to N: to relay `k` at `x` from its sender at `from_x`, m.
     ///
-    /// For `k` = 1 the sender is Tx at 0, and `from_x` is ignored. `None` for `k` outside of this range. The SIR is
-    /// infinite if sender and receiver have the same position.
+    /// For `k` = 1 the sender is Tx at 0, and `from_x` is ignored. `None` for another `k`. The SIR is infinite if
+    /// sender and receiver have the same position.
     pub fn sir_relay(&self, k: usize, from_x: f64, x: f64) -> Option<f64> {
         Hop::new(self, k, from_x).map(|hop| hop.sir(x))
     }
 
-    /// Returns the SIR (linear) of hop N+1 at Rx, with the last relay at `x` metres; `None` without relays.
+    /// Returns the linear SIR at Rx with the last relay at `x`, m; `None` without relays.
     pub fn sir_rx(&self, x: f64) -> Option<f64> {
         let last = self.relays.last()?;
         let signal = received_w(
@@ -32,7 +32,7 @@ impl Link {
         Some(signal / (interference + self.noise_w))
     }
 
-    /// Returns the SIR (linear) of the N+1 hops of a chain with relay k at `x[k-1]` metres.
+    /// Returns the linear SIRs of the N+1 hops of a chain with relay k at `x[k-1]`, m.
     ///
     /// Empty without relays, or if the number of positions in `x` differs from the number of relays.
     pub fn sir_hops(&self, x: &[f64]) -> Vec<f64> {
@@ -48,7 +48,7 @@ impl Link {
         sir
     }
 
-    /// Returns the SIR (linear) of a chain's worst hop; 0 if [`Link::sir_hops`] is empty.
+    /// Returns the linear SIR of a chain's worst hop; 0 if [`Link::sir_hops`] is empty.
     pub fn chain_sir(&self, x: &[f64]) -> f64 {
         self.sir_hops(x).into_iter().reduce(f64::min).unwrap_or(0.0)
     }

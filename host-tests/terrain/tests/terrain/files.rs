@@ -5,23 +5,23 @@ use std::path::PathBuf;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
 
-/// GeoTIFF that a test writes: position of the north-west height, cell size, EPSG code, nodata value.
+/// GeoTIFF that a test writes: its north-west grid point, cell size, EPSG code, size and nodata value.
 pub(crate) struct Raster {
     pub(crate) corner: [f64; 2],
     pub(crate) cell: [f64; 2],
     pub(crate) size: [u32; 2],
     pub(crate) epsg: u16,
     pub(crate) nodata: Option<f32>,
-    /// True if the file's tie point is the position of a height, false if it is the corner of a cell.
+    /// True if the tie point is the position of a height; false if it is the corner of a cell.
     pub(crate) is_point: bool,
-    /// GDAL's metadata, XML.
+    /// GDAL's metadata, as XML.
     pub(crate) metadata: Option<&'static str>,
     /// EPSG code of the vertical coordinate system.
     pub(crate) vertical: Option<u16>,
 }
 
 impl Raster {
-    /// Creates a GeoTIFF with a geographic grid (longitude and latitude) for a test.
+    /// Creates a GeoTIFF with longitude and latitude as coordinates.
     pub(crate) fn geographic(west: f64, north: f64, cell: f64, size: [u32; 2]) -> Self {
         Self {
             corner: [west, north],
@@ -35,7 +35,7 @@ impl Raster {
         }
     }
 
-    /// Writes the GeoTIFF; `height` returns the height at coordinates to the east and north.
+    /// Writes the GeoTIFF. `height` returns the height at an easting and northing.
     pub(crate) fn write(&self, file: &PathBuf, height: impl Fn(f64, f64) -> f64) {
         let [columns, rows] = self.size;
         let mut values = Vec::new();
@@ -90,7 +90,7 @@ impl Raster {
     }
 }
 
-/// Writes an SRTM tile of 1201 x 1201 heights for a test. `height` returns the height at a longitude and latitude.
+/// Writes an SRTM tile of 1201 x 1201 heights. `height` returns the height at a longitude and latitude.
 pub(crate) fn hgt(file: &PathBuf, [west, south]: [f64; 2], height: impl Fn(f64, f64) -> f64) {
     let mut bytes = Vec::new();
     for row in 0..1201 {

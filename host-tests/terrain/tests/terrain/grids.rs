@@ -8,7 +8,7 @@ use uav_relay_terrain::grid::Terrain;
 use crate::files::{Raster, hgt};
 use crate::{rng, seeds};
 
-/// Returns the height of a tilted plane, which bilinear interpolation reproduces exactly.
+/// Returns the height of a tilted plane. Bilinear interpolation reproduces it exactly.
 fn plane(east: f64, north: f64) -> f64 {
     500.0 + 300.0 * (east - 8.0) - 200.0 * (north - 47.0)
 }
@@ -22,7 +22,7 @@ fn heights_are_interpolated_within_and_between_files() {
     let folder = folder();
     let file = |name: &str| folder.path().join(name);
     let cell = 1.0 / 3600.0;
-    // Two tiles without overlap: a seam of one cell. The second has corner tie points.
+    // Two tiles side by side, one cell apart. The second has tie points at corners of cells.
     Raster::geographic(8.0, 47.1, cell, [360, 361]).write(&file("west.tif"), plane);
     let east = Raster {
         is_point: false,
@@ -49,7 +49,7 @@ fn heights_are_interpolated_within_and_between_files() {
             "{lat} {lon}: {height}"
         );
     }
-    // Corners of the grid, and the seam itself.
+    // Corners of the grid, and points between the two tiles.
     for (lat, lon) in [
         (47.0, 8.0),
         (47.1, 8.0),
@@ -61,7 +61,7 @@ fn heights_are_interpolated_within_and_between_files() {
     assert!((srtm.height_m(48.0, 9.0).unwrap() - plane(9.0, 48.0)).abs() < 0.01);
 }
 
-/// UTM coordinates by Krüger's series to the third order: independent of the crate's conversion.
+/// Converts to UTM coordinates by Krüger's series to the third order, independent of the crate.
 pub(crate) fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
     let n: f64 = 1.0 / (2.0 * 298.257_223_563 - 1.0);
     let alpha = [
@@ -126,7 +126,7 @@ fn utm_grids_have_the_heights_of_an_independent_projection() {
             let [e, n] = utm(lat, lon, zone.into());
             let expected = height(e, if south { n + 1e7 } else { n });
             let found = terrain.height_m(lat, lon).unwrap();
-            // A millimetre is a place within a centimetre.
+            // On this plane a millimetre of height is a centimetre of distance.
             assert!(
                 (found - expected).abs() < 2e-3,
                 "{epsg} {lat} {lon}: {found} {expected}"
@@ -194,7 +194,7 @@ fn unusable_files_and_places_are_named() {
         }
         .write(&file(name), plane);
     }
-    // Heights above the sea level of Normal Amsterdams Peil, in metres.
+    // Heights above Normaal Amsterdams Peil, in metres.
     Raster {
         vertical: Some(5709),
         ..geographic()
@@ -281,7 +281,7 @@ fn unusable_files_and_places_are_named() {
     }
 }
 
-/// Checks that the order of files that overlap decides nothing: they agree, or are refused.
+/// Checks that overlapping files whose heights differ too much are refused, in either order.
 #[test]
 fn files_that_contradict_each_other_are_named_with_the_place_and_both_heights() {
     let folder = folder();
@@ -323,7 +323,7 @@ fn files_that_contradict_each_other_are_named_with_the_place_and_both_heights() 
             assert!(line.contains(&part), "{line}: {part}");
         }
     }
-    // Nothing is compared with a hole.
+    // A hole is not compared with the other file.
     Raster {
         nodata: Some(-9999.0),
         ..east()
@@ -387,7 +387,9 @@ fn holes_and_uncovered_places_are_named() {
     );
 }
 
-/// Returns the model of Zurich (25 m) that the package `geotiff` ships, if Cargo has unpacked it.
+/// Returns the elevation model of Zurich (25 m) that the package `geotiff` contains.
+///
+/// `None` if Cargo has not unpacked the package.
 fn zurich() -> Option<Vec<u8>> {
     let cargo = std::env::var("CARGO_HOME").map(PathBuf::from);
     let cargo =
@@ -410,7 +412,7 @@ fn geographic(east: f64, north: f64) -> [f64; 2] {
     [lat, lon]
 }
 
-/// Checks a real elevation model, if it is there. Its file names no coordinate system, so the test adds one.
+/// Reads a real elevation model, if there is one. Its file has no coordinate system, so the test adds it.
 #[test]
 fn a_real_elevation_model_is_read() {
     let Some(original) = zurich() else {
@@ -423,7 +425,7 @@ fn a_real_elevation_model_is_read() {
     let line = Terrain::load(&[&file]).err().unwrap();
     assert!(line.contains("zurich.tif: "), "{line}");
     println!("without a coordinate system: {line}");
-    // A new directory at the end, with the keys of UTM zone 32 and cells with corners.
+    // A new directory at the end of the file: UTM zone 32, tie points at corners of cells.
     let keys: [u16; 12] = [1, 1, 0, 2, 1025, 0, 1, 1, 3072, 0, 1, 32632];
     let mut bytes = original.clone();
     let u32_at = |at: usize| u32::from_le_bytes(original[at..at + 4].try_into().unwrap());
@@ -455,7 +457,7 @@ fn a_real_elevation_model_is_read() {
             rng.random_range(1..398_usize),
             rng.random_range(1..365_usize),
         );
-        // Its 37 strips follow each other.
+        // The 37 strips of the file are contiguous.
         let at = 556 + 2 * (399 * row + column);
         let height = f64::from(u16::from_le_bytes([original[at], original[at + 1]]));
         let east = 677_562.5 + 25.0 * (column as f64 + 0.5);

@@ -1,7 +1,8 @@
 //! Diffraction loss: the ITU's validation examples, and a second implementation.
 //!
-//! The four terrain profiles (`data/itu_profiles.csv`, a line for each, one height every 50 m) and the losses are those of the document
-//! "Validation examples for the delta Bullington diffraction prediction method" of ITU-R Study Group 3.
+//! The four terrain profiles are in `data/itu_profiles.csv`, one per line, with a height every 50 m. Profiles and
+//! losses are those of the document "Validation examples for the delta Bullington diffraction prediction method" of
+//! ITU-R Study Group 3.
 
 use rand::RngExt as _;
 use uav_relay_terrain::diffraction::{LIGHT_M_S, Surface, knife_edge_db, loss_db, loss_over_db};
@@ -11,7 +12,7 @@ use crate::{rng, seeds};
 
 const LENGTHS_KM: [f64; 4] = [83.07993853, 132.315397, 17.39688966, 40.51112702];
 
-/// Heights of the two antennas above the ground, m, and frequency, MHz: five links over each profile.
+/// Antenna heights above the ground, m, and frequency, MHz, of the five links over each profile.
 const LINKS: [[f64; 3]; 5] = [
     [30.0, 30.0, 1000.0],
     [50.0, 10.0, 2500.0],
@@ -109,7 +110,7 @@ fn both_implementations_give_the_losses_that_the_itu_published() {
     );
 }
 
-/// Draws a random hilly profile: sums of a few sines, with antennas above or just below the hills.
+/// Draws a random hilly profile (a sum of a few sines), with antennas above or just below the hills.
 fn random(rng: &mut impl rand::Rng) -> Path {
     let length: f64 = 10_f64.powf(rng.random_range(-1.0..1.7));
     let n = rng.random_range(20..400);

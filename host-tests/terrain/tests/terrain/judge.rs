@@ -1,11 +1,11 @@
 //! Second implementation of the delta-Bullington method, which shares no code with the first.
 //!
-//! It has kilometres, gigahertz and the formulas of Recommendations ITU-R P.452 and P.1812, whose section on
-//! diffraction is the same method.
+//! It uses kilometres and gigahertz, and the formulas of Recommendations ITU-R P.452 and P.1812. Their section on
+//! diffraction describes the same method.
 
 use std::f64::consts::PI;
 
-/// Profile and link in the form of the ITU Recommendation, for an independent computation of the loss.
+/// Profile and link in the units of the ITU Recommendation.
 pub(crate) struct Path {
     /// Distances of the profile's points, km, from 0.
     pub(crate) d: Vec<f64>,
@@ -21,7 +21,7 @@ pub(crate) struct Path {
 
 const AE_KM: f64 = 8500.0;
 
-/// Parts of the diffraction loss of a hop as ITU-R P.526 defines them, dB.
+/// Parts of the diffraction loss of a hop, dB, named as in ITU-R P.526.
 pub(crate) struct Loss {
     pub(crate) actual: f64,
     pub(crate) smooth: f64,
@@ -68,7 +68,7 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
         light,
         ..
     } = *path;
-    // The Recommendations round these to 21.88, 0.9575, 0.036 and 18: 0.1 dB at losses above 100 dB.
+    // The Recommendations round these factors to 21.88, 0.9575, 0.036 and 18: 0.1 dB at losses above 100 dB.
     let per_km = PI * 1e12 / light;
     let to_x = per_km.powf(1.0 / 3.0);
     let to_y = 2.0 * (per_km * per_km / 1e9).powf(1.0 / 3.0);
@@ -102,7 +102,8 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
 
 /// Returns the diffraction loss of the smooth earth, dB.
 ///
-/// A bisection finds the point of the smallest clearance. From there both antennas have the same elevation angle, as for a reflection.
+/// A bisection finds the point at which the line of sight is closest to the earth. Both antennas have the same
+/// elevation angle there, as in a reflection.
 fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {
     let horizon = (2.0 * AE_KM / 1000.0).sqrt() * (h1.sqrt() + h2.sqrt());
     if d_km >= horizon {

@@ -23,7 +23,9 @@ mod profiles;
 use chacha20::ChaCha8Rng;
 use rand::SeedableRng as _;
 
-/// Returns the seeds of a random test. The environment variables `SEED` and `COUNT` set the first seed and the number of seeds.
+/// Returns the seeds of a random test.
+///
+/// `SEED` in the environment sets the first seed, and `COUNT` the number of seeds.
 fn seeds(count: u64) -> std::ops::Range<u64> {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
     let first = number("SEED").unwrap_or(1);

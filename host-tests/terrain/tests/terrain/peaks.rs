@@ -1,4 +1,4 @@
-//! Single heights that stand out of the ground: no profile, circle or room may miss one.
+//! Narrow peaks of a single grid point: no profile, circle or room may miss one.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -22,19 +22,19 @@ const PLAIN_M: f64 = 500.0;
 
 const WAVE_M: f64 = 0.125;
 
-/// Plain with single heights that stand out.
+/// Plain with narrow peaks, each of a single grid point.
 ///
-/// It computes its bilinear surface independently of the planner.
+/// Its surface is computed here, independently of the planner.
 struct Peaks {
     corner: [f64; 2],
     cell: [f64; 2],
     is_utm: bool,
-    /// Heights above the plain by column and row, m.
+    /// Heights of the peaks above the plain, m, by column and row.
     heights: HashMap<[i64; 2], f64>,
 }
 
 impl Peaks {
-    /// Random peaks near a line, in two files beside each other.
+    /// Draws random peaks near a line. They are in two files side by side.
     fn new(rng: &mut impl rand::Rng, ends: [[f64; 2]; 2], is_utm: bool) -> Self {
         let at = ends.map(|[lat, lon]| {
             if is_utm {
@@ -144,7 +144,7 @@ struct Scene {
 fn scene(folder: &std::path::Path, seed: u64) -> Scene {
     let rng = &mut rng(seed);
     let (lat, lon) = (rng.random_range(46.5..47.5), rng.random_range(8.2..9.8));
-    // Every sixth line is nearly along a row, and every sixth along a column.
+    // Every sixth line is almost parallel to a row, and every sixth to a column.
     let reach = |rng: &mut chacha20::ChaCha8Rng, narrow: bool| {
         let far = if narrow { 0.0002 } else { 0.02 };
         rng.random_range(-far..far)
@@ -202,12 +202,12 @@ fn profiles_have_the_highest_ground_and_blocked_hops_are_named() {
             rng.random_range(503.0..520.0),
         );
         let profile = ground.profile([node(from, h0), node(to, h1)]).unwrap();
-        // The judge: the surface every 400th of a cell along the geodesic.
+        // Independent check: the surface at every 400th of a cell along the geodesic.
         let (_, azimuth, _, _): (f64, f64, f64, f64) =
             earth.inverse(ends[0][0], ends[0][1], ends[1][0], ends[1][1]);
         let cell_m = if peaks.is_utm { 10.0 } else { 21.0 };
         let steps = (400.0 * (to - from) / cell_m).ceil() as u32;
-        // Between these points of the geodesic latitude and longitude are linear within a micrometre.
+        // Between these points of the geodesic, latitude and longitude are linear to a micrometre.
         let known: Vec<[f64; 2]> = (0..=steps / 100 + 2)
             .map(|part| {
                 let along = (to - from) * 100.0 * f64::from(part) / f64::from(steps);
@@ -228,7 +228,7 @@ fn profiles_have_the_highest_ground_and_blocked_hops_are_named() {
             let bulge = along * (to - from - along) / (2.0 * EARTH_M);
             [height, -(sight - height - bulge)]
         };
-        // The largest of each, and again a hundred times as fine around it.
+        // The largest of each, searched again around it in steps a hundred times as fine.
         let [highest, above_m] = [0, 1].map(|of: usize| {
             let largest = |from: f64, apart: f64, count: u32| {
                 let all = (0..=count).map(|step| from + apart * f64::from(step));
@@ -298,7 +298,7 @@ fn the_highest_ground_near_a_relay_is_that_of_the_surface() {
             let point = ground.point(x, y).unwrap();
             peaks.height_m([f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7])
         };
-        // A place beside a peak.
+        // Position beside a peak.
         let node = (0..500).map(|_| Node {
             x_m: rng.random_range(0.05..0.95) * axis.distance_m(),
             y_m: rng.random_range(-20.0..20.0),
@@ -318,7 +318,7 @@ fn the_highest_ground_near_a_relay_is_that_of_the_surface() {
             }
         }
         peaks_near += u32::from(highest > PLAIN_M + 1.0);
-        // The samples of the judge are up to 1.5 m apart.
+        // The samples of the check are up to 1.5 m apart.
         let steep = if peaks.is_utm { 2.5 } else { 1.2 };
         let apart = 0.5 * radius / 30.0 + radius * 0.00873;
         assert!(found > highest - 0.02, "seed {seed}: {found} {highest}");
@@ -350,7 +350,7 @@ fn no_hop_between_two_rooms_is_blocked_by_a_peak() {
         let rng = &mut rng(seed + 3_000_000);
         let d = axis.distance_m();
         let error = [0.5, 5.0][(seed % 2) as usize];
-        // x, y and height of the peaks, where they are known.
+        // x, y and height of the peaks in the elevation files.
         let at = |(at, height): (&[i64; 2], &f64)| {
             let [lon, lat] = [
                 peaks.corner[0] + at[0] as f64 * peaks.cell[0],
@@ -374,7 +374,7 @@ fn no_hop_between_two_rooms_is_blocked_by_a_peak() {
         let places = [0.33, 0.66].map(|share| Placement {
             x_m: (share * d) as f32,
             y_m: 0.0,
-            // About as high as the peaks, so that they limit the rooms.
+            // About as high as the peaks, so that the peaks limit the rooms.
             altitude_m: (rng.random_range(-1.0..1.0) + tops[rng.random_range(0..tops.len())])
                 as f32,
         });
@@ -417,7 +417,7 @@ fn no_hop_between_two_rooms_is_blocked_by_a_peak() {
                 }
             }
         }
-        // The ends of the rooms in all combinations, within the position error, and random positions.
+        // All combinations of the ends of the rooms, with the position error, and random positions.
         for draw in 0..8_u32 {
             let mut nodes = vec![[0.0, 0.0, ground.ends[0].amsl_m]];
             for (relay, (room, place)) in [first, second].iter().zip(&places).enumerate() {
@@ -493,7 +493,7 @@ fn a_relay_that_may_be_beyond_a_site_has_no_room() {
         let report = TerrainReport::new(&ground, &places, free, 2.4e9, 1.0).unwrap();
         rooms(&ground, &places, &report, limits).unwrap()
     };
-    // The ground is known up to the limit of the coordinates.
+    // Heights are known up to the limit of the coordinates.
     let far = Node {
         x_m: 100.0,
         y_m: -4999.5,
@@ -504,7 +504,7 @@ fn a_relay_that_may_be_beyond_a_site_has_no_room() {
         line.contains("is not covered by the elevation files"),
         "{line}"
     );
-    // Reversed intervals were returned here.
+    // An earlier version returned reversed intervals here.
     let near = rooms_at([0.4, d - 0.4]);
     assert_eq!(near, [None, None]);
     for room in rooms_at([30.0, d - 30.0]) {

@@ -1,4 +1,4 @@
-//! Profiles, clearances and heights of relays over analytic hills.
+//! Profiles, clearances and heights of relays over hills that are given by formulas.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use uav_relay_terrain::report::{FreeSpace, TerrainReport};
 use crate::files::Raster;
 use crate::{rng, seeds};
 
-/// Returns the height of hills of up to 100 m with slopes up to 45 %, at a longitude and latitude.
+/// Returns the height of the hills at a longitude and latitude, m: up to 100 m, slopes up to 45 %.
 fn hills(lon: f64, lat: f64) -> f64 {
     let (x, y) = ((lon - 8.0) * 75_500.0, (lat - 47.0) * 111_200.0);
     600.0 + 60.0 * (x / 300.0).sin() * (y / 350.0).cos() + 40.0 * (x / 190.0 + y / 250.0).sin()
@@ -71,8 +71,9 @@ fn profiles_are_within_a_metre_of_the_hills_along_geodesics() {
     println!("largest error of a profile: {worst:.3} m");
 }
 
-/// Returns the height of a wall of 100 m on a plain of 500 m. The wall is 2 km from Tx, on a line of 5 km to the
-/// east.
+/// Returns the height of a plain of 500 m with a wall of 100 m.
+///
+/// The line Tx-Rx is 5 km to the east; the wall is 2 km from Tx.
 fn wall(lon: f64, _: f64) -> f64 {
     500.0 + (100.0 - 0.3 * (lon - 8.035_f64).abs() * 76_000.0).max(0.0)
 }
@@ -93,7 +94,7 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
         "{line}"
     );
     close(ground.ends[0].amsl_m, 510.0, 0.01);
-    // The site is given 2 m too high: the antenna is above the ground.
+    // The scenario's height of the site is 2 m too high. The antenna's height counts from the ground.
     close(ground.ends[1].amsl_m, 510.0, 0.01);
     let top_x = 0.025 / 0.08 * axis.distance_m();
     let free = FreeSpace {
@@ -121,7 +122,7 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
     close(above.heights[0].above_ground_m, 20.0, 1.0);
     close(above.heights[0].above_obstacle_m, 20.0, 1.0);
     close(above.terrain_sir, 40.0, 1e-9);
-    // On the slope of the wall, 100 m above the plain, but with a part of the wall within its position error.
+    // On the slope of the wall, 100 m above the plain. A part of the wall is within the position error.
     let foot = report(top_x + 80.0, 99.4);
     close(foot.heights[0].above_ground_m, 24.0, 1.5);
     close(foot.heights[0].above_obstacle_m, 15.0, 1.5);

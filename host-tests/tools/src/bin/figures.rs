@@ -61,7 +61,9 @@ fn run(options: &Options) -> Result<(), FigureError> {
     Ok(())
 }
 
-/// Progress display of `cargo figures`. It is a bar on a terminal, otherwise a line on standard error per figure.
+/// Progress display of `cargo figures`.
+///
+/// It is a bar on a terminal, and otherwise a line on standard error for each figure.
 struct Progress {
     bar: ProgressBar,
     is_terminal: bool,
@@ -83,7 +85,7 @@ impl Progress {
             bar.set_style(style);
         }
         if is_terminal {
-            // A figure takes up to a minute: the clock shows that the work goes on.
+            // A figure takes up to a minute. The clock shows that the program is running.
             bar.enable_steady_tick(Duration::from_millis(200));
         }
         Self {

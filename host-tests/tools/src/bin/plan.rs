@@ -164,7 +164,7 @@ fn report(
     Ok(())
 }
 
-/// Finds the plan by the method that the options and the scenario need.
+/// Plans by the method that the options and the scenario need.
 fn planned_by(
     options: &Options,
     scenario: &Scenario,
@@ -192,7 +192,7 @@ fn planned_by(
     }
 }
 
-/// Returns the report of a failed request: no number of relays carries the requested data rate.
+/// Returns the report of a request for a data rate that no number of relays carries.
 fn slower(rates: Option<RateReport>, options: &Options) -> PlanReport {
     let error = rates.as_ref().map(too_fast).unwrap_or_default();
     let why = Why::Plain(error);
@@ -203,7 +203,7 @@ fn slower(rates: Option<RateReport>, options: &Options) -> PlanReport {
     .with_rates(rates)
 }
 
-/// Result of planning: the plan, the request that it answers, and the data rates.
+/// Result of planning: the plan, the number that was requested, and the data rates.
 struct Planned {
     /// Planned positions; `None` if no number of relays carries the requested data rate.
     plan: Option<Plan>,
@@ -211,9 +211,9 @@ struct Planned {
     rates: Option<RateReport>,
 }
 
-/// Returns the data link, for which the data rates are computed.
+/// Returns the data link for the data rates.
 ///
-/// `None` if no option asks for data rates, and the scenario has no section `[link]`.
+/// `None` if no option requests data rates and the scenario has no section `[link]`.
 fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failure> {
     let target_bps = options.wanted.target_rate_bps;
     let is_asked = options.rates || target_bps.is_some() || options.bandwidth_hz.is_some();
@@ -233,7 +233,7 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
     Ok(Some(radio))
 }
 
-/// Plans a given number of relays, or the fewest for a target SIR. Adds the data rates over `radio`, if any.
+/// Plans a given number of relays, or the fewest for a target SIR. Adds the data rates, if any.
 fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Result<Planned, NoPlan> {
     let most = match ask.number {
         Number::Of(relays) => relays,
@@ -259,7 +259,7 @@ fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Resul
     })
 }
 
-/// Plans a given number of relays. The hops' SIRs include the diffraction losses of the terrain.
+/// Plans a given number of relays with the diffraction losses of the terrain.
 fn above_terrain(
     scenario: &Scenario,
     ask: &PlanRequest,
@@ -344,7 +344,7 @@ fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>
     Ok(elevation)
 }
 
-/// Returns the settings of the drones' companion computers in the scenario file.
+/// Returns the section `[companion]` of the scenario file.
 fn companion(options: &Options) -> Result<Companion, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Companion::default());
@@ -354,7 +354,9 @@ fn companion(options: &Options) -> Result<Companion, Failure> {
     Ok(sections.companion)
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan is refused; `None` if it is accepted. Draws the terrain for `--profile`.
+/// Returns the terrain below `plan`, and the reason why the plan is refused, if it is.
+///
+/// Draws the terrain for `--profile`.
 fn terrain(
     options: &Options,
     scenario: &Scenario,
@@ -383,7 +385,7 @@ fn terrain(
     Ok((Some(report), problem.or(missed)))
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan cannot be flown; `None` if it can.
+/// Returns the terrain below `plan`, and the reason why the plan cannot be flown, if there is one.
 fn over(
     options: &Options,
     elevation: &Elevation,
@@ -588,7 +590,7 @@ struct Wanted {
     target_rate_bps: Option<f64>,
 }
 
-/// Parses a distance from Tx, m. The allowed range depends on the scenario, and is checked later.
+/// Parses a distance from Tx, m. Its range depends on the scenario, and is checked later.
 fn along(text: &str) -> Result<f64, String> {
     text.parse()
         .map_err(|_| "must be a number, metres from Tx".to_owned())
@@ -605,7 +607,7 @@ enum Altitude {
 }
 
 impl Altitude {
-    /// Returns the method by which relays in flight choose positions with these altitudes.
+    /// Returns the placement method that relays use in flight at these altitudes.
     const fn method(self) -> PlannedMethod {
         match self {
             Self::Given | Self::Terrain => PlannedMethod::Align,
@@ -629,10 +631,9 @@ impl Options {
         }
     }
 
-    /// Returns the number of relays of the request: given, or to be found for a target SIR.
+    /// Returns the requested number of relays, or the target SIR of the request.
     ///
-    /// For a requested data rate the result is 1 relay, because the number of relays is then found later by that
-    /// rate.
+    /// For a requested data rate it is 1 relay; the real number is found later.
     fn number(&self) -> Number {
         let wanted = &self.wanted;
         match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {
@@ -644,7 +645,7 @@ impl Options {
     }
 }
 
-/// Checks the options that concern interferers with an area.
+/// Checks the options that need an interferer with an area or a no-fly area.
 fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let AreaOptions {
         quantile,
@@ -709,7 +710,7 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the reason why the plan cannot be flown for the no-fly areas; `None` if it can.
+/// Returns the reason why the no-fly areas forbid the plan; `None` if they do not.
 fn no_fly(options: &Options, scenario: &Scenario, plan: &Plan) -> Option<String> {
     let chain: Vec<_> = plan.places.iter().map(|(place, _)| *place).collect();
     let is_free = options.altitude == Altitude::Free;
@@ -757,7 +758,7 @@ fn over_area(
     Ok(locating)
 }
 
-/// Rejects a target SIR for relays that choose the positions of the largest data rate.
+/// Rejects a target SIR if the relays would choose the positions of the largest data rate.
 fn check_target(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let wanted = &options.wanted;
     let asked = match (wanted.target_sir, wanted.target_sir_db) {
@@ -765,7 +766,7 @@ fn check_target(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         (_, Some(db)) => format!("--target-sir-db {db:?}"),
         (None, None) => return Ok(()),
     };
-    // In a [field] the relays stay at one altitude, and choose the positions of the largest SIR.
+    // In a [field] relays keep one altitude, and choose the positions of the largest SIR.
     let is_known = matches!(scenario.interference, Interference::Sources(_));
     if options.altitude == Altitude::Free && scenario.has_fitted_slots() && is_known {
         return Err(Failure::input(format!(
@@ -775,10 +776,9 @@ fn check_target(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Checks the options that concern `--out` before planning, so that a mistake is found at once.
+/// Checks the options that conflict with `--out`, before the planning starts.
 ///
-/// In flight, relays choose their x themselves, and in an interference field keep their altitude. Options that
-/// contradict this are rejected.
+/// In flight, relays choose their x themselves, and in an interference field keep their altitude.
 fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let Some(file) = &options.out else {
         return Ok(());
@@ -810,18 +810,18 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Positions on which the relays of a plan agree in flight.
+/// Positions that the relays of a plan agree on in flight.
 struct InFlight {
-    /// Scenario with the altitudes that were chosen for the terrain; `None` if none were chosen.
+    /// Scenario with the altitudes chosen for the terrain; `None` if none were chosen.
     own: Option<Scenario>,
     flown: Flown,
     flight: Option<Flight>,
-    /// Reason why the relays cannot fly to these positions; `None` if they can.
+    /// Reason why the relays cannot fly to the positions that they agree on; `None` if they can.
     problem: Option<String>,
 }
 
 impl InFlight {
-    /// Simulates the flight of the relays of `plan`, if there is any terrain.
+    /// Computes the positions that the relays of `plan` agree on. With terrain it simulates the flight.
     fn new(
         options: &Options,
         scenario: &Scenario,
@@ -864,19 +864,21 @@ impl InFlight {
     }
 }
 
-/// Report of the flight of a plan's relays.
+/// Report about the flight of a plan's relays.
 #[derive(Default)]
 struct Flying {
-    /// Text that tells the user the next command; empty without `--out`.
+    /// Text with the next command for the user; empty without `--out`.
     next: String,
     flight: Option<Flight>,
-    /// Reason why the flight over the terrain was not simulated; `None` if it was, or without terrain.
+    /// Reason why the flight over terrain was not simulated; `None` if it was, or without terrain.
     unknown: Option<String>,
     /// Reason why the relays cannot fly over the terrain; `None` if none was found.
     problem: Option<String>,
 }
 
-/// Simulates the flight of a plan over the terrain, for a request without `--out`. Empty without terrain.
+/// Simulates the flight of a plan over the terrain, for a request without `--out`.
+///
+/// The report is empty without terrain.
 fn flying(
     options: &Options,
     scenario: &Scenario,
@@ -927,7 +929,7 @@ fn said(none: NoPlan, options: &Options) -> String {
     }
 }
 
-/// Writes the file of `--out`: the scenario with the positions that its relays will choose.
+/// Writes the file of `--out`: the scenario, and the positions that its relays will choose.
 fn write_out(
     options: &Options,
     file: &Path,
@@ -998,7 +1000,7 @@ fn write_out(
         Some(_) => with_altitudes(&text, &flown.plan).map_err(wrong)?,
         None => text,
     };
-    // Paths are relative to the folder of the file.
+    // Paths in a file are relative to its folder.
     let folder = options.scenario.as_deref().and_then(Path::parent);
     let is_moved = folder != file.parent();
     let text = match folder {
@@ -1030,9 +1032,9 @@ fn write_out(
     })
 }
 
-/// Loads the scenario file's sections about the network and the companion computers.
+/// Loads the sections `[network]`, `[companion]` and `[ground]` of the scenario file.
 ///
-/// Rejects them if they state a number of relays other than `relays`.
+/// Another number of relays than `relays` in `[network]` is an error.
 fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Deployment::default());

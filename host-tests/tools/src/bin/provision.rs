@@ -23,7 +23,7 @@ use uav_relay_tools::provision::config::{ADDRESS, LEN, MAX_PROBE_AFTER_MS, Secre
 use uav_relay_tools::provision::folder::{Heading, summary};
 use uav_relay_tools::provision::{block, folder};
 
-/// Request of the user: the options, completed with values of the scenario and of its plan.
+/// Options of the user, completed by the scenario and its plan.
 struct Asked<'a> {
     options: &'a Options,
     scenario: Scenario,
@@ -34,7 +34,7 @@ struct Asked<'a> {
     uavs: u16,
     method: Method,
     tolerance: f64,
-    /// Silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
+    /// Silence of a neighbour after which a relay probes it, ms; 0 selects the firmware's default.
     probe_after_ms: u32,
 }
 
@@ -107,7 +107,7 @@ impl<'a> Asked<'a> {
             None => Default::default(),
         };
         let section = &deployment.network;
-        // A path in the file is relative to its folder.
+        // Paths in a file are relative to its folder.
         let folder = options.scenario.as_deref().and_then(Path::parent);
         let of_file = section
             .key_file
@@ -233,7 +233,8 @@ impl<'a> Asked<'a> {
     /// Returns the positions that the relays will choose; `None` if they are not needed or not known.
     ///
     /// # Errors
-    /// The plan in the scenario is out of date, or the hypothetical interferer costs too much SIR.
+    /// The plan in the scenario is out of date, a relay is in a no-fly area, or the hypothetical interferer costs too
+    /// much SIR.
     fn flown(&self) -> Result<Option<Flown>, String> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
@@ -253,10 +254,10 @@ impl<'a> Asked<'a> {
         }
         let method = match self.method {
             Method::Joint => PlannedMethod::Joint,
-            // `adjust` starts from these.
+            // `adjust` starts from the positions of `align`.
             Method::Align | Method::Adjust => PlannedMethod::Align,
         };
-        // Relays report by themselves that they settle on nothing.
+        // Relays report it themselves if they agree on no positions.
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
@@ -289,10 +290,12 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
-    /// Simulates the flight over terrain and no-fly areas. `None` without terrain, or if the positions are not known.
+    /// Simulates the flight over terrain and no-fly areas.
+    ///
+    /// `None` without terrain, or if the positions are not known.
     ///
     /// # Errors
-    /// A hop that is blocked, a relay too low or too high, or elevation files that cannot be used.
+    /// A hop is blocked, a relay is too low or too high, or the elevation files cannot be used.
     fn over_terrain(&self, flown: Option<&Flown>) -> Result<Option<Simulated>, String> {
         let named = |line: String| format!("{}: {line}", self.name);
         let failed = |none| match none {
@@ -335,9 +338,10 @@ impl<'a> Asked<'a> {
         Ok(Some(flight))
     }
 
-    /// Returns the lowest and the highest ground, m above the sea.
+    /// Returns the lowest and the highest ground around the flight, m above the sea.
     ///
-    /// The highest one includes the least height above the ground. Both are those from Tx to Rx, and beside the line as far as drones take off. `None` without terrain.
+    /// It is the ground from Tx to Rx, and beside this line as far as drones take off. The highest ground is raised by
+    /// the least height above the ground. `None` without terrain.
     fn ground_m(&self) -> Result<Option<[f64; 2]>, String> {
         let scenario = &self.scenario;
         let why = |line: String| {
@@ -362,7 +366,7 @@ impl<'a> Asked<'a> {
         error_m.map_or(POSITION_ERROR_M, f64::from)
     }
 
-    /// Prints that terrain and no-fly areas of the scenario are not checked, and why.
+    /// Prints why terrain and no-fly areas of the scenario are not checked.
     fn unchecked(&self, why: &str) -> Option<Simulated> {
         let has_terrain = self.scenario.terrain.is_some();
         for (what, is_there) in [
@@ -549,9 +553,9 @@ fn new_key() -> Result<[u8; 32], String> {
     Ok(key)
 }
 
-/// Checks that the radio channel is fast enough for `uavs` relays; wired relays always pass.
+/// Checks that the radio channel is fast enough for `uavs` relays; wires always are.
 ///
-/// `probe_after` is the silence after which a relay probes a neighbour.
+/// `probe_after` is the silence of a neighbour after which a relay probes it.
 fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
     if options.wires {
         return Ok(());
@@ -707,9 +711,7 @@ fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
         .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
 }
 
-/// Prints which options override values of the scenario's section `network`.
-///
-/// Otherwise a user could rely on a value of the file that is not used.
+/// Prints which options replace values of the scenario's section `network`.
 fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
     let say = |option: &str, key: &str| {
         command::print_line(&format!(
@@ -742,10 +744,10 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
     }
 }
 
-/// Returns the method to provision: `method`, else that of the section `network`, else `align`.
+/// Returns the method to provision: `method`, else the method of the section `network`, else `align`.
 ///
-/// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is from the section. If the two differ, the
-/// plan's method is rejected; the command line's method is used, and the user is told.
+/// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is from the section. If
+/// the two differ, a planned method is an error; a method of the command line is used, with a message.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,
@@ -755,7 +757,7 @@ fn chosen_method(
     let Some(text) = of_file else {
         return Ok(method.unwrap_or(Method::Align));
     };
-    // The scenario has already been checked.
+    // The check of the scenario has accepted this name.
     let own = Method::from_str(text, false).unwrap_or(Method::Align);
     match method {
         Some(method) if method != own => {

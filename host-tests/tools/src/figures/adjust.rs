@@ -1,4 +1,4 @@
-//! Algorithm 2: positions of the relays and SIR of the chain by round.
+//! Algorithm 2: positions of the relays, and SIR of the chain, by round.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -12,7 +12,7 @@ use super::walk::{Flown, fly};
 /// Number of relays in the figures of Algorithm 2.
 pub const RELAYS: u16 = 50;
 
-/// Common altitude of the relays before Algorithm 2, m: the paper's best altitude.
+/// Common altitude of the relays before Algorithm 2, m: the best altitude in the paper.
 pub const START_M: f64 = 220.0;
 
 /// Largest change of a relay's altitude in one round of Algorithm 2, m.
@@ -21,7 +21,7 @@ pub const EXPLORE_M: f32 = 10.0;
 /// Numbers of rounds of Algorithm 2 after which the figure shows the relays' positions.
 pub const ROUNDS: [u16; 4] = [0, 10, 50, 500];
 
-/// Search on a grid for a relay's best position, for comparison with the coarse-to-fine search.
+/// Search for a relay's best position on a grid, for comparison with the coarse-to-fine search.
 pub const GRID: Local = Local::Grid {
     columns: 41,
     rows: 21,
@@ -36,7 +36,7 @@ struct ShapeRow {
     altitude_m: f32,
 }
 
-/// Table row: SIR of the chain after one round of Algorithm 2, with two kinds of search.
+/// Table row: SIR of the chain after one round of Algorithm 2, with each of two searches.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct RoundRow {
     /// Round number of Algorithm 2; 0 stands for the chain before the first round.
@@ -98,8 +98,8 @@ fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
 
 /// Returns the chain's SIR after each round of Algorithm 2, from 0 to `rounds`.
 ///
-/// Each row has the SIR with the coarse-to-fine search and that with the grid search. A search that has ended keeps
-/// its last SIR.
+/// Each row has the SIR with the coarse-to-fine search and with the grid search. A search that ends earlier keeps its
+/// last SIR.
 fn rounds(rounds: u16) -> Result<Vec<RoundRow>, FigureError> {
     let (fine, grid) = rayon::join(
         || adjusted(RELAYS, START_M, rounds, Local::Fine),
@@ -135,9 +135,9 @@ fn taken() -> Vec<String> {
     ]
 }
 
-/// Formats the horizontal distances of neighbouring relays near Tx, in the middle, and near Rx.
+/// Formats the horizontal distances of neighbours near Tx, in the middle, and near Rx.
 ///
-/// The positions are the relays' positions after `round` rounds of Algorithm 2.
+/// The relays are at their positions after `round` rounds of Algorithm 2.
 fn steps(rows: &[ShapeRow], round: u16) -> String {
     let x = |relay: u16| {
         let mut of = rows.iter().filter(|row| row.round == round);

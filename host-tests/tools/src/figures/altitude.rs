@@ -1,4 +1,4 @@
-//! SIR of a chain at a common altitude, as a function of that altitude.
+//! SIR of a chain whose relays share one altitude, as a function of this altitude.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -15,7 +15,7 @@ pub const RELAYS: u16 = 50;
 /// Distances of the interferer from the line Tx-Rx, m, one for each curve of the figure.
 pub const OFFSETS_M: [f64; 5] = [100.0, 150.0, 200.0, 300.0, 400.0];
 
-/// Distance of the interferer from the line, m, for which the paper states a best altitude of 220 m.
+/// Distance of the interferer from the line Tx-Rx, m, for the paper's best altitude of 220 m.
 pub const PAPERS_OFFSET_M: f64 = 150.0;
 
 /// Table row: SIR of the chain at one common altitude, with the interferer at one offset.
@@ -25,25 +25,23 @@ struct Row {
     altitude_m: f64,
     /// SIR of the worst hop by Algorithm 1, linear.
     sir_linear: f64,
-    /// SIR of the worst hop, linear, if the target SIR falls by 0.1 from pass to pass, as in the paper.
+    /// SIR of the worst hop with the paper's step, linear; `None` far from the paper's best altitude.
     ///
-    /// A pass is a series of messages along the chain. Only for altitudes near the paper's best altitude, otherwise
-    /// `None`.
+    /// With this step the target SIR falls by 0.1 for each series of messages along the chain.
     sir_by_step_linear: Option<f64>,
 }
 
-/// Lowest and highest altitude, m, of the close-up around the paper's best altitude, in steps of 0.5 m.
+/// Lowest and highest altitude, m, of the part of the figure with a point every 0.5 m.
 const CLOSE_UP_M: (u32, u32) = (195, 230);
 
-/// Returns a table row for each pair of an interferer's offset and a common altitude, both in m.
+/// Returns a table row for each pair of an interferer's offset and a common altitude, m.
 fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }
 
-/// Returns the points of the figure: pairs of the interferer's distance from the line and an altitude.
+/// Returns the points of the figure: pairs of an interferer's offset and a common altitude, m.
 ///
-/// Both are in m. Altitudes are 5 m apart. For the distance for which the paper states the best altitude, they are
-/// 0.5 m apart near that altitude.
+/// Altitudes are 5 m apart. For the offset of the paper's best altitude, they are 0.5 m apart near that altitude.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {
@@ -82,9 +80,8 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 
 /// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// The interferer is at (500, `y_m`) m. The search tries altitudes 5 m apart, then searches around the best of them to
-/// 0.1 m. It keeps the refined altitude only if the SIR is higher by more than twice the tolerance with which a chain's
-/// SIR is computed.
+/// The interferer is at (500, `y_m`) m. The search tries altitudes 5 m apart, and then refines the best of them to 0.1
+/// m. The refined altitude must have a higher SIR by more than twice the tolerance of a chain's SIR.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;

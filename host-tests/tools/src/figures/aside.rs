@@ -1,4 +1,4 @@
-//! Relay beside the line: its best position by lateral room, and the gain of freedom. The freedom is lateral and vertical.
+//! Relay beside the line Tx-Rx: its best position, and the SIR gained by lateral and vertical freedom.
 
 use crate::single::{Found, aside, theorems};
 use rayon::prelude::*;
@@ -13,27 +13,27 @@ use uav_relay_scenario::Scenario;
 /// Power of the single relay, W.
 pub const RELAY_W: f64 = 0.5;
 
-/// Lowest and highest altitude permitted to the relay, m.
+/// Lowest and highest altitude that the relay may have, m.
 pub const ALTITUDES_M: (f64, f64) = (20.0, 300.0);
 
-/// Distances of the interferer from the line Tx-Rx, m, one for each curve in the figure of positions.
+/// Distances of the interferer from the line Tx-Rx, m, one for each curve of the figure of positions.
 pub const OFFSETS_M: [f64; 4] = [50.0, 100.0, 150.0, 250.0];
 
-/// Largest distance from the line Tx-Rx permitted to a relay in the figure of positions, m.
+/// Largest distance from the line Tx-Rx that a relay may have in the figure of positions, m.
 pub const MOST_ROOM_M: u16 = 400;
 
 const ROOM_STEP_M: u16 = 4;
 
-/// Largest distance from the line Tx-Rx permitted to the relay in the figure of the SIR gain, m.
+/// Largest distance from the line Tx-Rx that the relay may have in the figure of the SIR gain, m.
 ///
-/// It equals the highest permitted altitude: the figure compares the gain by lateral offset with that by altitude.
+/// It equals the highest altitude: the figure compares lateral with vertical freedom.
 pub const ROOM_M: f64 = 300.0;
 
 /// Largest distance of the interferer from the line Tx-Rx in the figure of the SIR gain, m.
 const MOST_OFFSET_M: u16 = 400;
 const OFFSET_STEP_M: u16 = 5;
 
-/// Table row: best position of the relay for one limit of its distance from the line.
+/// Table row: best position of the relay for one limit of its distance from the line Tx-Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     interferer_y_m: f64,
@@ -44,18 +44,17 @@ struct Row {
     sir_linear: f32,
 }
 
-/// Table row: best SIRs of one relay, with different freedom to leave its position above the line.
+/// Table row: best SIRs of one relay with four kinds of freedom.
 ///
-/// The relay is above the line at the lowest altitude, above the line at any altitude, beside the line at the lowest
-/// altitude, or at any position.
+/// The relay has y = 0 or any permitted y, at the lowest altitude or at any permitted altitude.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
-    /// Best SIR of a relay above the line at the lowest altitude, linear.
+    /// Best SIR of a relay on the line Tx-Rx at the lowest altitude, linear.
     line_sir_linear: f32,
-    /// Best SIR of a relay above the line at any permitted altitude, linear.
+    /// Best SIR of a relay on the line Tx-Rx at any permitted altitude, linear.
     altitude_sir_linear: f32,
-    /// Best SIR of a relay at the lowest altitude that may leave the line, linear.
+    /// Best SIR of a relay beside the line Tx-Rx at the lowest altitude, linear.
     side_sir_linear: f32,
     both_sir_linear: f32,
     both_altitude_m: f32,
@@ -79,9 +78,9 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
     Ok(found)
 }
 
-/// Returns the relay's best positions at the lowest altitude, for each interferer's offset.
+/// Returns the relay's best positions at the lowest altitude.
 ///
-/// For each offset there is one position per permitted distance from the line; these distances are `step_m` apart.
+/// There is one for each interferer's offset and each limit of the relay's |y|. The limits are `step_m` apart.
 fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
@@ -101,10 +100,7 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the relay's best SIRs for different distances of the interferer from the line.
-///
-/// The relay is above the line at the lowest altitude, above it at any altitude, or beside it. The distances are
-/// `step_m` apart.
+/// Returns the relay's best SIRs for interferers at several y, which are `step_m` apart.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
@@ -132,7 +128,7 @@ fn taken() -> Vec<String> {
     )]
 }
 
-/// Computes the figure of a single relay's best positions beside the line.
+/// Computes the figure of a single relay's best positions beside the line Tx-Rx.
 pub fn places_sheet() -> Result<Sheet, FigureError> {
     let rows = data(ROOM_STEP_M)?;
     let lines = |of: fn(&Row) -> (f64, f64)| -> Vec<Line> {
@@ -181,7 +177,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
     })
 }
 
-/// Computes the figure of the SIR that a relay gains by leaving the line or the lowest altitude.
+/// Computes the figure of the SIR gain of a relay with free y or free altitude.
 pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {

@@ -1,4 +1,4 @@
-//! The paper's figure of Beta distributions of the interference power relative to its maximum.
+//! The paper's figure of Beta distributions of the interference power.
 
 use libm::lgamma;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use super::sheet::{FigureError, Sheet, Table};
 /// Shape parameters (alpha, beta) of the drawn Beta distributions.
 pub const SHAPES: [(f64, f64); 5] = [(1.5, 4.0), (2.0, 2.0), (3.0, 1.2), (4.0, 8.0), (8.0, 4.0)];
 
-/// Number of equal steps in which the horizontal axis, from 0 to 1, is divided.
+/// Number of equal steps of the horizontal axis, which is from 0 to 1.
 pub const STEPS: u32 = 100;
 
 /// Table row: one point of the density of a Beta distribution.
@@ -18,8 +18,9 @@ pub const STEPS: u32 = 100;
 struct Row {
     alpha: f64,
     beta: f64,
-    /// Product of Upsilon = E[1/I] and the largest interference power `I_max`. Relays use 1 / Upsilon as interference
-    /// power.
+    /// Product of Upsilon = E[1/I] and the largest interference power `I_max`.
+    ///
+    /// Relays use 1 / Upsilon as the interference power.
     upsilon_times_i_max: f64,
     /// Interference power I as a fraction of its maximum `I_max`, 0 to 1.
     interference_over_i_max: f64,

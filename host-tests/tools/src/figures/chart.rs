@@ -1,4 +1,4 @@
-//! Description of a chart before it is drawn: panels, axes and lines.
+//! Description of a chart: panels, axes and curves.
 
 use std::ops::Range;
 
@@ -6,23 +6,23 @@ use plotters::coord::ranged1d::{
     KeyPointHint, KeyPointWeight, NoDefaultFormatting, Ranged, ValueFormatter,
 };
 
-/// Chart: one or several pairs of axes, stacked vertically, with one common legend.
+/// Chart: one or more panels below each other, with one legend.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Chart {
-    /// Panels of the chart from top to bottom; each has axes of its own.
+    /// Panels of the chart from top to bottom, each with its own axes.
     pub panels: Vec<Panel>,
 }
 
 /// Panel of a chart: a pair of axes and the curves drawn in it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Panel {
-    /// Heading that distinguishes this panel from the chart's other panels; empty for a single panel.
+    /// Heading that distinguishes the panel from the others; empty for a single panel.
     pub heading: String,
     /// Horizontal axis of the panel.
     pub x: Axis,
     /// Vertical axis of the panel.
     pub y: Axis,
-    /// Curves in drawing order: later ones are on top.
+    /// Curves in drawing order; later curves are on top.
     pub lines: Vec<Line>,
 }
 
@@ -50,18 +50,18 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-/// Style of a curve: colour, stroke and markers, all different from other curves of the chart.
+/// Style of a curve: colour, stroke and markers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
-    /// Number of the colour, from 0 to 6, which also selects the shape of the markers.
+    /// Number of the colour, 0 to 6. It also selects the shape of the markers.
     pub hue: usize,
-    /// Stroke of the line between the curve's points: full, dashed or dotted.
+    /// Stroke between the curve's points: full, dashed or dotted.
     pub stroke: Stroke,
-    /// Choice of the points that get a marker.
+    /// Choice of the points that have a marker.
     pub signs: Signs,
 }
 
-/// Points of a curve that get a marker.
+/// Points of a curve that have a marker.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Signs {
     /// Curve without markers.
@@ -77,16 +77,16 @@ pub enum Signs {
 pub enum Stroke {
     /// Points are not connected; only their markers are drawn.
     None,
-    /// Solid line through the curve's points.
+    /// Solid line through the points.
     Full,
-    /// Dashed line through the curve's points.
+    /// Dashed line through the points.
     Dashed,
-    /// Dotted line through the curve's points.
+    /// Dotted line through the points.
     Dotted,
 }
 
 impl Axis {
-    /// Creates a linear axis with the label `title`, whose ends fit the data.
+    /// Creates a linear axis with the label `title`. Its ends fit the data.
     pub fn linear(title: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -95,7 +95,7 @@ impl Axis {
         }
     }
 
-    /// Creates a logarithmic axis with the label `title`, whose ends fit the data.
+    /// Creates a logarithmic axis with the label `title`. Its ends fit the data.
     pub fn log(title: &str) -> Self {
         Self {
             kind: Kind::Log,
@@ -138,7 +138,7 @@ impl Look {
         }
     }
 
-    /// Changes the style so that markers are well apart in the picture.
+    /// Returns the style with markers that are well apart in the picture.
     pub const fn spaced(self) -> Self {
         Self {
             signs: Signs::Spaced,
@@ -146,7 +146,7 @@ impl Look {
         }
     }
 
-    /// Changes the style so that no point gets a marker.
+    /// Returns the style without markers.
     pub const fn unsigned(self) -> Self {
         Self {
             signs: Signs::None,
@@ -154,7 +154,7 @@ impl Look {
         }
     }
 
-    /// Changes the stroke of the line between the points to `stroke`.
+    /// Returns the style with the stroke `stroke` between the points.
     pub const fn joined(self, stroke: Stroke) -> Self {
         Self { stroke, ..self }
     }
@@ -203,9 +203,7 @@ const STEPS: f64 = 6.0;
 /// A longer axis has labels at powers of ten only.
 const FEW_DECADES: f64 = 2.4;
 
-/// Distance that a tick may lie beyond an end of the axis, as a fraction of its length.
-///
-/// It allows for rounding.
+/// Largest distance of a tick beyond the end of an axis, due to rounding, as a fraction of the axis.
 const ROUNDING: f64 = 1e-9;
 
 /// Scale of an axis, linear or logarithmic.
@@ -217,7 +215,7 @@ pub enum Kind {
     Log,
 }
 
-/// Axis with known end values, which positions and labels its ticks.
+/// Axis with known ends. It positions and labels its ticks.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Scale {
     kind: Kind,
@@ -233,7 +231,7 @@ impl Scale {
         Self { kind, from, to }
     }
 
-    /// Creates an axis for data from `least` to `most`; its ends are the next round numbers outside.
+    /// Creates an axis for data from `least` to `most`. Its ends are the next round numbers outside.
     pub fn around(kind: Kind, least: f64, most: f64) -> Self {
         match kind {
             Kind::Linear => {
@@ -334,7 +332,7 @@ fn digits(value: f64) -> String {
     if value.abs() < 1e-12 {
         return "0".to_owned();
     }
-    // Four digits after the first one are more than any step has.
+    // No step has more than four digits after its first digit.
     let decimals = usize::try_from(4 - decade(value.abs())).unwrap_or(0);
     let text = format!("{value:.decimals$}");
     if text.contains('.') {

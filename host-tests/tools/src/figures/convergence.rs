@@ -1,4 +1,4 @@
-//! Algorithm 1 with the paper's step: SIR of the chain by sweep.
+//! Algorithm 1 with the paper's step: SIR of the chain after each pass of messages.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,11 +10,10 @@ use super::{paper, walk};
 /// Numbers of relays in the chains of the figure, one chain for each curve.
 pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 
-/// Decrease of the target SIR from one pass to the next, linear, as in the paper's Algorithm 1. A pass is a series of
-/// messages along the chain.
+/// Decrease of the target SIR from one pass of messages to the next, linear, as in the paper.
 pub const STEP: f64 = 0.1;
 
-/// Table row: SIR of a chain after one pass of messages along the chain (a sweep).
+/// Table row: SIR of a chain after one pass of messages along the chain.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
@@ -25,8 +24,9 @@ struct Row {
     sir_linear: f64,
 }
 
-/// Returns table rows for the passes of messages of each chain, until the chain settles. Some passes are left out,
-/// because they are too many to draw.
+/// Returns table rows for the passes of messages of each chain, until its positions are final.
+///
+/// Some passes are left out, because they are too many to draw.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let chains: Result<Vec<Vec<Row>>, FigureError> =
         relays.par_iter().map(|&relays| sweeps(relays)).collect();
@@ -50,7 +50,7 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects the passes (messages along the chain) that the figure draws, the last passes more densely.
+/// Selects the passes of messages that the figure draws; the last ones are closer together.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()

@@ -1,4 +1,4 @@
-//! Cost of settling a chain: passes, messages and bytes by number of relays.
+//! Cost until a chain's positions are final: passes of messages, messages and bytes.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,10 +10,10 @@ use super::walk::{Flown, fly};
 use super::{convergence, paper};
 use uav_relay_scenario::Scenario;
 
-/// Numbers of relays for which the figure shows the cost.
+/// Numbers of relays in the figure of the cost.
 pub const RELAYS: [u16; 10] = [1, 2, 3, 5, 8, 14, 24, 40, 65, 100];
 
-/// Table row: messages and bytes until a chain settles, by three ways to choose the target SIRs.
+/// Table row: messages and bytes of a chain, for three ways to choose the target SIRs.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
@@ -22,20 +22,21 @@ struct Row {
     step_messages: u64,
     step_bytes: u64,
     step_sir_linear: f64,
-    /// Number of passes of messages along the chain, with the bracketed schedule. With this schedule the leader
-    /// narrows an interval around the best target SIR. The leader does not predict the target.
+    /// Number of passes of messages along the chain, with the bracketed schedule.
+    ///
+    /// The leader then narrows an interval around the best target SIR, without a prediction.
     bracketed_sweeps: u32,
     bracketed_messages: u64,
     bracketed_bytes: u64,
     bracketed_sir_linear: f64,
-    /// Number of passes of messages along the chain, if its leader first predicts the solution.
+    /// Number of passes of messages along the chain, if the leader first predicts the target SIR.
     predicted_sweeps: u32,
     predicted_messages: u64,
     predicted_bytes: u64,
     predicted_sir_linear: f64,
 }
 
-/// Simulates a chain of each number of relays, with each of three ways to choose the target SIRs.
+/// Simulates a chain of each number of relays, with each way to choose the target SIRs.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     relays.par_iter().map(|&relays| row(relays)).collect()
 }
@@ -91,7 +92,7 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     }
 }
 
-/// Computes the figure of the passes, messages and bytes that a chain needs until it settles.
+/// Computes the figure of the passes, messages and bytes until a chain's positions are final.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let ratio = rows.last().map_or(0.0, |row| {

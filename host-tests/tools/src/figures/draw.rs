@@ -1,4 +1,6 @@
-//! Draws a chart as SVG for half a page: at a width of 8 cm the smallest letters are 6.5 points high.
+//! Draws a chart as SVG for half a page.
+//!
+//! At a width of 8 cm the smallest letters are 6.5 points high.
 
 use std::fmt::Display;
 
@@ -18,19 +20,19 @@ const LETTER: u32 = 17;
 const SAMPLE: u32 = 104;
 
 const FONT: &str = "Helvetica, Arial, 'DejaVu Sans', sans-serif";
-/// Font size of all text. The drawing library divides sizes by 1.24, so the factor 1.24 compensates for this.
+/// Font size of all text. The drawing library divides sizes by 1.24, hence the factor.
 const LETTERS: f64 = 28.0 * 1.24;
 const INK: RGBColor = RGBColor(34, 34, 34);
 const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
 const PEN: u32 = 4;
 const APART: f64 = 105.0;
-/// Shift of a curve's markers along the curve per colour number, in picture units.
+/// Shift of a curve's markers along the curve for each colour number, in picture units.
 ///
-/// It puts the markers of curves that coincide side by side instead of on top of each other.
+/// The markers of coinciding curves are then side by side.
 const APART_BY_HUE: u8 = 25;
 
-/// Error: the chart cannot be drawn, with the reason.
+/// Error: the chart cannot be drawn, for this reason.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NotDrawn(pub String);
 
@@ -148,7 +150,7 @@ fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
         Signs::All => line.points.clone(),
         Signs::Spaced => {
             let mut signed = Vec::new();
-            // Different offsets per hue keep the signs of overlapping lines apart.
+            // A different offset for each colour keeps the markers of overlapping curves apart.
             let mut since =
                 APART - f64::from(APART_BY_HUE * u8::try_from(line.look.hue).unwrap_or(0));
             let mut before: Option<(i32, i32)> = None;
@@ -171,7 +173,7 @@ fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
     }
 }
 
-/// Returns the lengths of a stroke's dashes and gaps, in picture units; `None` if no line is drawn.
+/// Returns the lengths of a stroke's dashes and gaps, in picture units; `None` for no line.
 ///
 /// A solid line has gaps of 0.
 const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
@@ -183,7 +185,7 @@ const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     }
 }
 
-/// Returns the entries of the legend: the name of each curve once, with the style of its first curve.
+/// Returns the entries of the legend: each name once, with the style of its first curve.
 fn entries(chart: &Chart) -> Vec<(&str, Look)> {
     let mut entries: Vec<(&str, Look)> = Vec::new();
     for line in chart.panels.iter().flat_map(|panel| &panel.lines) {
@@ -260,7 +262,7 @@ const COLOURS: [RGBColor; 7] = [
 
 const SIZE: i32 = 9;
 
-/// Returns the colour with the number `hue`; the numbers begin again after the last colour.
+/// Returns the colour with the number `hue`. The numbers start again after the last colour.
 pub(super) fn colour_of_hue(hue: usize) -> RGBColor {
     let [black, ..] = COLOURS;
     COLOURS.get(hue % COLOURS.len()).copied().unwrap_or(black)

@@ -33,7 +33,7 @@ struct Row {
     interferer_y_m: f64,
     relay_w: f64,
     target_linear: u16,
-    /// Smallest number of relays that reaches the target SIR; `None` if no number does.
+    /// Smallest number of relays that meets the target SIR; `None` if no number does.
     relays: Option<u16>,
 }
 

@@ -12,7 +12,7 @@ use uav_relay_scenario::scene::Scene;
 /// Largest number of relays in the figure; every number from 1 to it is drawn.
 pub const MOST_RELAYS: u16 = 100;
 
-/// Seed of the random chains: a chain of N relays uses this seed plus N.
+/// Seed of the random chains. A chain of N relays uses this seed plus N.
 pub const SEED: u64 = 1000;
 
 /// Table row: SIRs of four placements, and the gains of Algorithm 1, for one number of relays.
@@ -25,7 +25,7 @@ struct Row {
     random_sir_linear: f64,
     /// Standard error of `random_sir_linear`, linear.
     random_error_linear: f64,
-    /// SIR of the worst hop if relays maximise the weakest signal and ignore interference, linear.
+    /// SIR of the worst hop if relays maximise the weakest signal without regard to interference, linear.
     blind_sir_linear: f64,
     /// SIR of the worst hop with equal spacing, linear.
     equal_sir_linear: f64,
@@ -34,7 +34,9 @@ struct Row {
     gain_over_equal_percent: f64,
 }
 
-/// Returns a table row for each number of relays. The mean over random positions is the mean of `draws` chains.
+/// Returns a table row for each number of relays.
+///
+/// The mean over random positions is that of `draws` chains.
 fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()

@@ -1,4 +1,4 @@
-//! Comparison of the best common altitude, Algorithm 2 from there, and the joint method.
+//! Comparison of the best common altitude, of Algorithm 2, and of the joint method.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,7 +11,7 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use super::walk::fly;
 
-/// Numbers of relays for which the figure compares the methods.
+/// Numbers of relays in the comparison.
 pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
 
 /// Largest number of rounds of Algorithm 2.
@@ -26,11 +26,11 @@ struct Row {
     common_altitude_m: f64,
     /// SIR of Algorithm 1 at the best common altitude, linear.
     common_sir_linear: f64,
-    /// SIR of Algorithm 2, which starts from the best common altitude, linear.
+    /// SIR of Algorithm 2 from the best common altitude on, linear.
     adjust_sir_linear: f64,
-    /// Number of messages that Algorithm 1 and then Algorithm 2 send.
+    /// Number of messages of Algorithm 1 and then Algorithm 2.
     adjust_messages: u64,
-    /// SIR of the joint method, which chooses positions and altitudes together, linear.
+    /// SIR of the joint method, linear. It chooses positions and altitudes together.
     joint_sir_linear: f64,
     joint_passes: u32,
     joint_messages: u64,

@@ -1,4 +1,4 @@
-//! SIR and data rate of a chain over its number of relays, for one direction and for both.
+//! SIR and data rate of a chain by its number of relays, in one direction and in both.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -16,29 +16,29 @@ use crate::plan::{Number, Plan, PlanRequest, plan};
 /// Largest number of relays in the figure; every number from 1 to it is drawn.
 pub const MOST_RELAYS: u16 = 24;
 
-/// Table row: SIRs and data rates of one number of relays, for data to Rx only and for data both ways.
+/// Table row: SIRs and data rates of one number of relays, in one direction and in both.
 ///
-/// For data both ways, the same SIR or rate is required in each direction.
+/// For both directions, the same SIR or rate is required in each.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
-    /// SIR of the worst hop to Rx, linear, with the positions that are best for data to Rx.
+    /// SIR of the worst hop to Rx, linear, at the best positions for data to Rx.
     one_way_sir_linear: f64,
-    /// SIR of the worst hop of both directions, linear, with the best positions for data both ways.
+    /// SIR of the worst hop of both directions, linear, at the best positions for both.
     both_ways_sir_linear: f64,
-    /// SIR of the worst hop of both directions, linear, with the positions that are best for data to Rx.
+    /// SIR of the worst hop of both directions, linear, at the best positions for data to Rx.
     judged_sir_linear: f64,
-    /// Data rate to Rx in equal time slots, with the positions that give the largest rate.
+    /// Data rate to Rx in equal time slots, at the positions with the largest rate.
     one_way_slots_bit_per_s_hz: f64,
-    /// Data rate to Rx in time slots as long as each hop needs, with the positions of the largest rate.
+    /// Data rate to Rx in time slots as long as each hop needs, at the positions with the largest rate.
     one_way_fitted_bit_per_s_hz: f64,
     /// Data rate of each direction if data goes both ways, in equal time slots.
     ///
-    /// The relays are at the positions that give the largest rate.
+    /// The relays are at the positions with the largest rate.
     both_ways_slots_bit_per_s_hz: f64,
     /// Data rate of each direction if data goes both ways, in time slots as long as each hop needs.
     ///
-    /// The relays are at the positions that give the largest rate.
+    /// The relays are at the positions with the largest rate.
     both_ways_fitted_bit_per_s_hz: f64,
 }
 
@@ -93,7 +93,7 @@ fn row(relays: u16) -> Result<Row, FigureError> {
     })
 }
 
-/// Computes the figure of SIR and data rate by the number of relays, for one direction and for both.
+/// Computes the figure of SIR and data rate by the number of relays, in one direction and in both.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let relays: Vec<u16> = (1..=MOST_RELAYS).collect();
     let rows: Result<Vec<Row>, FigureError> = relays.par_iter().map(|n| row(*n)).collect();

@@ -1,4 +1,4 @@
-//! Lemma 1: the locus where both hops of a single relay have the same SIR.
+//! Lemma 1: the positions at which both hops of a single relay have the same SIR.
 
 use crate::single::theorems::equal_altitudes;
 use serde::Serialize;
@@ -22,16 +22,16 @@ pub const DISTANCE_M: f64 = 35.0;
 
 const FINENESS: u8 = 20;
 
-/// Table row: altitudes at one x at which both hops of a single relay have the same SIR.
+/// Table row: altitudes at which both hops of a single relay have the same SIR, at one x.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     tx_w: f64,
     interferer_x_m: f64,
     interferer_y_m: f64,
     x_m: f32,
-    /// Lower altitude at which both hops have the same SIR, m; `None` if there is no such altitude.
+    /// Lower altitude with the same SIR on both hops, m; `None` if there is no such altitude.
     lower_altitude_m: Option<f32>,
-    /// Upper altitude at which both hops have the same SIR, m; `None` if there is no such altitude.
+    /// Upper altitude with the same SIR on both hops, m; `None` if there is no such altitude.
     upper_altitude_m: Option<f32>,
 }
 
@@ -45,7 +45,7 @@ pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, FigureE
     paper::mission(&scenario, 1)
 }
 
-/// Returns the altitudes of equal SIR at `per_m` positions per metre of the line Tx-Rx.
+/// Returns the altitudes of equal SIR at `per_m` positions per metre between Tx and Rx.
 fn data(per_m: u8) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for choice in CHOICES {
@@ -89,7 +89,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         );
         let name = format!("Tx {tx_w} W, ({x_m}, {y_m}) m");
         let line = |points| Line::new(&name, Look::number(index).spaced(), points);
-        // If there is no altitude above Tx, both branches start at a common point further on.
+        // If there is no altitude above Tx, both curves start at a common point farther on.
         if upper.first().is_some_and(|first| first.0 > 0.0) {
             lines.push(line([lower.into_iter().rev().collect(), upper].concat()));
         } else {

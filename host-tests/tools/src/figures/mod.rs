@@ -1,8 +1,8 @@
 //! The paper's evaluation, computed by the on-board code: pictures, tables and a page.
 //!
-//! Every figure is a file with a pure `data` function, which returns typed rows, and a `sheet` function, which draws them. The
-//! numbers come from `uav_relay` or from the simulated chain that runs it; the baselines from [`baseline`](crate::baseline). The
-//! tests compare them with the independent f64 reference `uav_relay_oracle`.
+//! Every figure is a file with two functions: `data` returns typed rows, and `sheet` draws them. The numbers come from
+//! `uav_relay`, or from a simulated chain of it. Baselines are in [`baseline`](crate::baseline). The tests compare the
+//! numbers with the independent f64 reference `uav_relay_oracle`.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -48,7 +48,7 @@ pub struct Figure {
     pub make: fn() -> Result<Sheet, FigureError>,
 }
 
-/// Figures that `cargo figures` can make. First the paper's figures in its order, then this project's own figures.
+/// Figures that `cargo figures` can make: the paper's figures in its order, then further ones.
 pub const ALL: [Figure; 17] = [
     figure("locus", locus::sheet),
     figure("single", single::sheet),

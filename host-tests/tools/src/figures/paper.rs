@@ -5,18 +5,18 @@ use uav_relay::Mission;
 use super::sheet::FigureError;
 use uav_relay_scenario::{Interference, Scenario, Source, mission};
 
-/// Relative tolerance of the target SIR, for chains computed without messages.
+/// Relative tolerance of the target SIR for chains computed without messages.
 ///
 /// It is some ten times the relative spacing of f32 numbers.
 pub(super) const FINE: f64 = 1e-6;
 
-/// Relative tolerance of the target SIR, for simulated chains: the default of `cargo chain`.
+/// Relative tolerance of the target SIR for simulated chains: the default of `cargo chain`.
 const FLOWN: f64 = 1e-4;
 
-/// Returns the paper's multi-hop scenario, with the parameters of its fourth and fifth sub-table.
+/// Returns the paper's multi-hop scenario: the fourth and fifth part of its table.
 ///
 /// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no minimum separation, because
-/// Algorithms 1 and 4 as printed have none. A separation of 4 m would not change any of the optima.
+/// the printed Algorithms 1 and 4 have none. A separation of 4 m would not change any of the optima.
 pub fn multi_hop() -> Scenario {
     Scenario {
         min_separation_m: 0.0,

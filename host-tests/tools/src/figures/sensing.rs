@@ -1,4 +1,4 @@
-//! SIR of a chain that locates an unknown interferer: by agreement, and while the interferer moves.
+//! SIR of a chain that locates an unknown interferer: fixed, by agreement, and moving, by speed.
 
 use serde::Serialize;
 
@@ -10,15 +10,15 @@ use crate::listening::{
 };
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Number of random arrangements of interferers for each curve of the figure in which they do not move.
+/// Number of random arrangements of interferers for each curve with fixed interferers.
 pub const SCENES: u64 = 60;
-/// Number of random arrangements for each speed in the figure with a moving interferer.
+/// Number of random arrangements for each speed of a moving interferer.
 pub const PASSES: u64 = 6;
 
 /// Speeds of the moving interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// Table row: ratio of the SIR to the best possible SIR after a number of agreements on positions.
+/// Table row: SIR as a fraction of the best possible SIR after a number of agreements on positions.
 ///
 /// The row summarises many random arrangements of the interferers.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -29,26 +29,26 @@ struct AgreementShare {
     agreements: usize,
     /// Median of the chain's SIR divided by the best possible SIR, over all arrangements of interferers.
     median_linear: f64,
-    /// Ratio of the SIR to the best possible SIR that nine of ten arrangements of interferers reach.
+    /// Fraction of the best possible SIR that nine of ten arrangements of interferers reach.
     tenth_linear: f64,
 }
 
-/// Table row: mean SIR relative to the best possible SIR while the interferer moves at one speed.
+/// Table row: mean of SIR / best possible SIR, for one speed of the interferer.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct Tracked {
     relays: u16,
     speed_mps: f64,
-    /// Mean ratio of the SIR to the best possible SIR at the same time, if the chain tracks the interferer.
+    /// Mean of SIR / best possible SIR at each moment, if the chain follows the interferer.
     followed_linear: f64,
-    /// Mean ratio of the SIR to the best possible SIR at the same time, if the chain does not move.
+    /// Mean of SIR / best possible SIR at each moment, if the chain does not move.
     ///
-    /// The chain keeps the positions that were best after the first minute.
+    /// It keeps the positions that were best after the first minute.
     stayed_linear: f64,
 }
 
 type Run = fn(&RandomScene) -> Result<Setup, FigureError>;
 
-/// Kinds of experiments: name, number of relays, number of interferers, and setup function of each.
+/// Kinds of experiments: name, number of relays, number of interferers, and setup function.
 const KINDS: [(&str, u16, usize, Run); 6] = [
     ("3 relays, one source", 3, 1, unknown),
     ("8 relays, one source", 8, 1, unknown),
@@ -63,7 +63,7 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ),
 ];
 
-/// Returns the table rows of the SIR as a fraction of the best possible SIR, by number of agreements.
+/// Returns table rows of the SIR as a fraction of the best possible SIR, by number of agreements.
 ///
 /// There is a row for each kind of experiment and number of agreements, over `scenes` random arrangements of the
 /// interferers.
@@ -84,7 +84,7 @@ fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the table rows of the mean SIR relative to the best possible SIR, by the interferer's speed.
+/// Returns table rows of the mean SIR as a fraction of the best possible SIR, by interferer speed.
 ///
 /// There is a row for each number of relays and speed, over `scenes` random arrangements.
 fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
@@ -105,8 +105,8 @@ fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
 
 /// Computes the figure of chains that must locate an unknown interferer.
 ///
-/// The first panel shows the lost fraction of the best possible SIR against the number of agreements. The second
-/// panel shows the fraction that is reached against the speed of the interferer.
+/// The first panel shows the lost fraction of the best possible SIR by the number of agreements. The second panel shows
+/// the reached fraction by the speed of the interferer.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
     let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {

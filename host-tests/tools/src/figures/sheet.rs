@@ -19,15 +19,15 @@ pub struct Sheet {
     pub name: &'static str,
     /// Title of the figure, shown above it.
     pub title: &'static str,
-    /// Paragraphs of the figure's caption, which describe the content of the figure.
+    /// Paragraphs of the figure's caption.
     pub says: Vec<String>,
-    /// Notes below the figure: the parameters of the computation, and parameters that the paper omits.
+    /// Notes below the figure: parameters of the computation, among them those that the paper omits.
     pub taken: Vec<String>,
     /// Chart of the figure, written as an SVG file.
     pub chart: Chart,
     /// Tables with the figure's numbers, written as CSV files.
     pub tables: Vec<Table>,
-    /// Cells of a short table in the figure's caption; the first row has the headings. Empty for no table.
+    /// Cells of a short table in the caption, headings first; empty for no table.
     pub shown: Vec<Vec<String>>,
 }
 
@@ -41,7 +41,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Creates a table of `rows`. The column headings are the names of the rows' fields.
+    /// Creates a table of `rows`. The headings are the names of the rows' fields.
     ///
     /// # Errors
     /// [`FigureError::Table`] if a row cannot be serialised, [`FigureError::NotFinite`] if a number is not finite.
@@ -66,7 +66,7 @@ impl Table {
 }
 
 impl Sheet {
-    /// Returns the content of the CSV file of `table`, with the figure's title and parameters as comments.
+    /// Returns the CSV file of `table`, with the figure's title and parameters as comments.
     pub fn csv(&self, table: &Table) -> String {
         let mut text = format!("# {}\n", self.title);
         for line in &self.taken {
@@ -82,7 +82,7 @@ h2{font-size:1.15rem;margin:0 0 .5rem}figcaption{max-width:46rem}p,ul{margin:.5r
 .taken{color:#555;font-size:.9rem}table{border-collapse:collapse;font-size:.85rem;margin:.7rem 0}\
 th,td{border-bottom:1px solid #ccc;padding:.15rem .7rem .15rem 0;text-align:right}th:first-child,td:first-child{text-align:left}";
 
-/// Writes a figure's picture (SVG) and tables (CSV) to the folder `dir`.
+/// Writes the figure's picture (SVG) and tables (CSV) to the folder `dir`.
 pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
     let svg = draw(&sheet.chart, sheet.title)?;
     write(&dir.join(format!("{}.svg", sheet.name)), &svg)?;
@@ -173,7 +173,7 @@ fn escape(words: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// Reason why a figure cannot be made. The inputs are fixed, so any reason except `File` is a bug.
+/// Reason why a figure cannot be made. Any reason but `File` is a bug, because the inputs are fixed.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum FigureError {
@@ -181,7 +181,7 @@ pub enum FigureError {
     Mission(Refusal),
     /// A relay rejects the settings of the figure, for this reason.
     Setup(SetupError),
-    /// A target SIR cannot be met, or a simulated chain has not settled. The text names the chain.
+    /// A target SIR cannot be met, or a simulated chain has no final positions. The text names the chain.
     Unsettled(&'static str),
     /// The chart of the figure cannot be drawn, for this reason.
     Drawing(NotDrawn),

@@ -1,4 +1,6 @@
-//! Relay at its best position (Theorem 1), against random, interference-blind and middle positions.
+//! Relay at its best position (Theorem 1), compared with random, blind and middle positions.
+//!
+//! A blind position ignores the interference.
 
 use crate::single::theorems;
 use rayon::prelude::*;
@@ -17,10 +19,10 @@ pub const REALISATIONS: [(f64, f64); 2] = [(100.0, 0.5), (80.0, 2.0)];
 /// First and last altitude of the figure, m, in steps of 1 m.
 pub const ALTITUDES_M: (u32, u32) = (10, 50);
 
-/// Seed of the relay's random positions: each altitude uses this seed plus the altitude in metres.
+/// Seed of the relay's random positions. Each altitude uses this seed plus the altitude in metres.
 pub const SEED: u64 = 2000;
 
-/// Table row: SIRs of a single relay at different positions, for one altitude and pair of powers.
+/// Table row: SIRs of a single relay at several positions, for one altitude and pair of powers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     tx_w: f64,
@@ -39,12 +41,12 @@ struct Row {
     random_rate_bit_per_s_hz: f64,
     /// SIR of the worse hop with the relay where the weaker received signal is strongest, linear.
     ///
-    /// That position ignores the interference.
+    /// This position does not depend on the interference.
     blind_sir_linear: f64,
     middle_sir_linear: f64,
 }
 
-/// Returns the paper's dual-hop scenario (its third sub-table), with one relay at `altitude_m`.
+/// Returns the paper's dual-hop scenario (third part of its table), with one relay at `altitude_m`.
 pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
     let altitude_m = f64::from(altitude_m);
     Scenario {
@@ -66,7 +68,7 @@ pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
 
 /// Returns a table row for each pair of powers (Tx, relay) and altitude.
 ///
-/// The mean over random positions is the mean of `draws` positions.
+/// The mean over random positions is that of `draws` positions.
 fn data(powers_w: &[(f64, f64)], altitudes_m: &[u32], draws: u32) -> Result<Vec<Row>, FigureError> {
     let choices: Vec<(f64, f64, u32)> = powers_w
         .iter()
@@ -101,52 +103,51 @@ fn row(tx_w: f64, relay_w: f64, altitude_m: u32, draws: u32) -> Option<Row> {
     })
 }
 
-// Average gain of one relay at its best position, under several readings of the paper's text.
+// Average gain of one relay at its best position, by several readings of the paper.
 //
-// The paper prints an average gain in SIR of 30.14 % over a random position and of 25.73 % over the interference-blind method,
-// and up to 65 %, without the powers. This file computes many powers and several ways of averaging.
+// The paper prints an average gain in SIR of 30.14 % over a random position and of 25.73 % over the interference-blind
+// method, and up to 65 %. It does not print the powers, so this file computes many powers and several ways of
+// averaging.
 
-/// Transmit powers of Tx, W, for the table of average gains. A gain is the increase in SIR by the optimal position of
-/// one relay.
+/// Powers of Tx, W, in the table of average gains.
 pub const TX_W: [f64; 17] = [
     5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 31.5, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0,
     200.0,
 ];
 
-/// Transmit powers of the relay, W, for the table of average gains. A gain is the increase in SIR by the optimal
-/// position of the relay.
+/// Powers of the relay, W, in the table of average gains.
 pub const RELAY_W: [f64; 17] = [
     0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0,
 ];
 
-/// Average gains that the paper prints, percent: over random positions, and over the blind method.
+/// Average gains in the paper, percent: over random positions, and over the blind method.
 ///
 /// The blind method ignores the interference.
 pub const PRINTED_PERCENT: (f64, f64) = (30.14, 25.73);
 
 const PRINTED_LARGEST_PERCENT: f64 = 65.0;
 
-/// Largest difference of a computed and a printed average gain that count as equal, percentage points.
+/// Largest difference between equal gains, computed and printed, percentage points.
 const NEAR: f64 = 0.5;
 
-/// Interpretation of the paper's "average gain": the quantity that is averaged over the altitudes.
+/// Reading of the paper's "average gain": the quantity that is averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub enum Reading {
-    /// Gain in linear SIR at each altitude, averaged over the altitudes.
+    /// Mean over the altitudes of the gain in linear SIR.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Gain in linear SIR after the SIRs are averaged over the altitudes.
+    /// Gain of the mean linear SIR over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
-    /// Gain after the SIRs in dB are averaged over the altitudes.
+    /// Gain of the mean SIR, where the SIRs are averaged in dB over the altitudes.
     #[serde(rename = "gain of mean dB")]
     Decibels,
-    /// Gain after log2(1 + SIR) is averaged over the altitudes.
+    /// Gain of the mean of log2(1 + SIR) over the altitudes.
     #[serde(rename = "gain of mean log2(1 + SIR)")]
     Rates,
 }
 
-/// List of all interpretations of the paper's "average gain".
+/// List of all readings of the paper's "average gain".
 pub const READINGS: [Reading; 4] = [
     Reading::LinearGains,
     Reading::LinearMeans,
@@ -167,7 +168,7 @@ impl Reading {
 
 /// Table row: gains of the best position over other positions, for one pair of powers.
 ///
-/// The gains are averaged over the altitudes in the way that `reading` states.
+/// `reading` states how the gains are averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct GainRow {
     tx_w: f64,
@@ -175,24 +176,24 @@ struct GainRow {
     reading: Reading,
     /// Average gain over a random position, percent.
     ///
-    /// `None` if the random position's average is 0 or negative: an average in dB can be negative.
+    /// `None` if the random position's average is not above 0, as an average in dB can be.
     over_random_percent: Option<f64>,
     /// Average gain over the position that ignores the interference, percent.
     ///
-    /// `None` if that position's average is 0 or negative: an average in dB can be negative.
+    /// `None` if that position's average is not above 0, as an average in dB can be.
     over_blind_percent: Option<f64>,
     over_middle_percent: Option<f64>,
-    /// Largest gain over a random position, percent, in linear SIR: the maximum over all altitudes.
+    /// Largest gain in linear SIR over a random position, percent: the maximum over the altitudes.
     largest_over_random_percent: f64,
-    /// Largest gain over the position that ignores the interference, percent, in linear SIR.
+    /// Largest gain in linear SIR over the position that ignores the interference, percent.
     ///
-    /// It is the maximum over all altitudes.
+    /// It is the maximum over the altitudes.
     largest_over_blind_percent: f64,
 }
 
-/// Returns the average gains for every pair of powers (Tx, relay), W, and every kind of average.
+/// Returns the average gains for every pair of powers (Tx, relay), W, and every reading.
 ///
-/// The averages are over the altitudes, m; random positions are averaged over `draws`.
+/// The averages are over the altitudes, m. Random positions are averaged over `draws`.
 fn gains(
     tx_w: &[f64],
     relay_w: &[f64],
@@ -211,10 +212,9 @@ fn gains(
         .collect())
 }
 
-/// Returns a mean value (`reading`: SIR, dB or rate) for four positions of the relay at one altitude.
+/// Returns the mean that `reading` needs, for four positions of the relay at one altitude.
 ///
-/// The positions are the best position, a random position, the best position without interference, and the middle of
-/// the line.
+/// The positions are the best one, a random one, the best one without interference, and the middle.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
     let linear = [
         f64::from(row.sir_linear),
@@ -236,7 +236,7 @@ fn four(row: &Row, reading: Reading) -> [f64; 4] {
     }
 }
 
-/// Averages the gains in `rows` (the altitudes of one pair of powers) by the interpretation `reading`.
+/// Averages the gains in `rows`, the altitudes of one pair of powers, as `reading` states.
 ///
 /// `None` without rows.
 fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
@@ -275,10 +275,10 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger of the differences between a row's two average gains and the printed gains.
+/// Returns the larger difference between a row's two average gains and the printed gains.
 ///
-/// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, else the gain
-/// over the blind method.
+/// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, otherwise over
+/// the blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent
@@ -291,7 +291,7 @@ fn off(row: &GainRow, middle: bool) -> f64 {
     from(row.over_random_percent, PRINTED_PERCENT.0).max(from(other, PRINTED_PERCENT.1))
 }
 
-/// Describes in two paragraphs how many computed averages agree with the paper's averages.
+/// Returns two paragraphs that say how many computed averages agree with the paper's averages.
 fn findings(gains: &[GainRow]) -> Vec<String> {
     let least = |reading: Reading| {
         let of = gains.iter().filter(|row| row.reading == reading);
@@ -324,11 +324,10 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// Returns the cells of the caption's table. It compares the paper's averages with computed averages.
+/// Returns the cells of the caption's table, which compares printed with computed averages.
 ///
-/// The first row has the printed averages. Then there is a row for each kind of average, with the pair of powers
-/// whose averages are nearest to the printed averages. The last rows are for the pairs of powers that the figure
-/// shows.
+/// The first row has the printed averages. Then each reading has a row with its nearest averages, and their pair of
+/// powers. The last rows are for the pairs of powers in the figure.
 fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",

@@ -1,4 +1,4 @@
-//! Algorithm 4 with the paper's step, in an even and in an uneven field.
+//! Algorithm 4 with the paper's step. The interference varies along the line Tx-Rx, or is the same.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -13,33 +13,31 @@ use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 /// Numbers of relays, one for each curve of the figure.
 pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];
 
-/// Seed of the random interference, where it varies along the line Tx-Rx.
+/// Seed of the interference that varies along the line Tx-Rx.
 pub const SEED: u64 = 4;
 
 const SPACING_M: u32 = 20;
 
 const ALPHA: f64 = 3.0;
 
-/// Largest interference power as a multiple of the power that a relay receives from 1 W right below it.
+/// Largest interference power, as a multiple of the power received from 1 W right below the relay.
 const MOST: f64 = 2.0;
 
-/// Kind of known interference: varying along the line Tx-Rx, or the same everywhere.
+/// Kind of interference: varying along the line Tx-Rx, or the same everywhere.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Interference that varies along the line: E[1 / I] is between 0.6 / P and 1 / P.
+    /// Interference that varies along the line Tx-Rx: E[1 / I] is between 0.6 / P and 1 / P.
     ///
-    /// I is the interference power; P is the power that a relay receives from a sender of 1 W right below it.
+    /// I is the interference power. P is the power that a relay receives from 1 W right below it.
     Uneven,
     /// Interference that is the same everywhere: E[1 / I] is 0.8 / P.
     ///
-    /// I is the interference power; P is the power that a relay receives from a sender of 1 W right below it.
+    /// I is the interference power. P is the power that a relay receives from 1 W right below it.
     Even,
 }
 
-/// Table row: expected SIR of a chain after one pass of messages along the chain.
-///
-/// The interference is random; its distribution is known along the line Tx-Rx.
+/// Table row: expected SIR of a chain in random interference, after one pass of messages.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     field: Kind,
@@ -51,12 +49,12 @@ struct Row {
     sir_linear: f64,
 }
 
-/// Table row: distribution of the random interference power I at one x on the line Tx-Rx.
+/// Table row: distribution of the interference power I at one x between Tx and Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PointRow {
     field: Kind,
     x_m: f64,
-    /// First shape parameter of the Beta distribution of the interference power relative to its maximum.
+    /// First shape parameter of the Beta distribution of I / `I_max`.
     alpha: f64,
     beta: f64,
     /// Largest interference power `I_max`, W.
@@ -69,9 +67,9 @@ fn lambda_w(mission: &Mission) -> f64 {
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// Returns the distributions of the interference power of this `kind`, at points along the line Tx-Rx.
+/// Returns the distributions of the interference of this `kind` at points between Tx and Rx.
 ///
-/// The relays interpolate between the points. If the interference is the same everywhere, there is one point.
+/// Relays interpolate between the points. Interference that is the same everywhere has one point.
 fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;
@@ -92,7 +90,7 @@ fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     })
 }
 
-/// Returns the mission of `relays` relays whose interference along the line Tx-Rx is of this kind.
+/// Returns the mission of `relays` relays in interference of this kind.
 pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     let points = field(kind)?;
     let spec = Field {
@@ -113,9 +111,9 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     paper::mission(&scenario, relays)
 }
 
-/// Returns a table row for each pass of messages along each chain.
+/// Returns a table row for each pass of messages of each chain.
 ///
-/// The chains have the given numbers of relays; the interference varies along the line or is the same everywhere.
+/// There is a chain for each of these numbers of relays and each kind of interference.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for field in [Kind::Uneven, Kind::Even] {
@@ -135,10 +133,10 @@ fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the cells of the caption's table: SIRs of settled chains by three searches of a target SIR.
+/// Returns the cells of the caption's table: final SIRs by three searches for the target SIR.
 ///
-/// The first search lowers the target SIR by the paper's step of 0.1 in each pass of messages, the second by 0.01.
-/// The third narrows an interval around the best target SIR.
+/// The first search lowers the target SIR by the paper's step of 0.1 in each pass of messages, the second by 0.01. The
+/// third narrows an interval around the best target SIR.
 fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     let mut rows = vec![
         ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]
@@ -170,9 +168,9 @@ fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     Ok(rows)
 }
 
-/// Creates the curve of one chain: its SIR after each pass of messages along the chain.
+/// Returns the curve of one chain: its SIR after each pass of messages.
 ///
-/// A chain that settles early keeps its last SIR up to the right end of the picture.
+/// A chain with final positions keeps its SIR up to the right end of the picture.
 fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     let of = rows
         .iter()
@@ -193,7 +191,7 @@ fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
 
 /// Computes the figure of the expected SIR after each pass of messages of Algorithm 4.
 ///
-/// It has a panel for interference that varies along the line, and one for interference that is the same everywhere.
+/// It has a panel for each kind of interference.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let panel = |heading: &str, field: Kind| Panel {

@@ -1,4 +1,4 @@
-//! A whole chain computed without messages, by the functions that relays use for one hop each.
+//! Chain computed without messages, by the functions that each relay uses for its hop.
 
 use uav_relay::optimiser::ladder::TARGETS;
 use uav_relay::optimiser::pass::{Behind, Link, close};
@@ -12,7 +12,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::sheet::FigureError;
 
-/// Chain of identical relays: their positions and its SIR.
+/// Chain of equal relays: their positions and its SIR.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Chain {
     /// Positions of the relays in order from Tx to Rx.
@@ -23,8 +23,8 @@ pub struct Chain {
 
 /// Places each relay as far toward Rx as the target SIR `target` (linear, > 0) allows.
 ///
-/// `None` if a hop cannot meet the target. If the target is too high, the last relay is far from the end of the
-/// chain, and the last hop has a lower SIR. The cost is one search for a farthest position for each relay.
+/// `None` if a hop cannot meet the target. If the target is too high, the last relay is too far from Rx, and the last
+/// hop has a lower SIR. The cost is one search for a farthest position for each relay.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     let profile = mission.config().common;
     let mut from = PerTarget::from(
@@ -64,23 +64,21 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     Some(Chain { places, sir })
 }
 
-/// Pass of messages along the chain in Algorithm 1: its target SIR and the chain that results.
-///
-/// The target falls by the paper's fixed step from one pass to the next.
+/// Pass of messages along the chain in Algorithm 1: its target SIR and the resulting chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass of messages, from 1.
     pub number: u32,
     /// Target SIR of every hop in this pass of messages, linear.
     pub target: f32,
-    /// Chain with each relay as far from Tx as the target SIR allows; `None` if a hop cannot meet it.
+    /// Chain with each relay as far from Tx as the target allows; `None` if a hop cannot meet it.
     pub chain: Option<Chain>,
 }
 
-/// Returns all passes of messages along the chain until it settles, by the paper's Algorithm 1.
+/// Returns all passes of messages along the chain until its positions are final, by Algorithm 1.
 ///
-/// `step` is the decrease of the target SIR from one pass to the next, linear. If the interference is known only
-/// along the line (a field), the algorithm is the paper's Algorithm 4.
+/// `step` is the decrease of the target SIR from one pass to the next, linear. If the interference is known only along
+/// the line Tx-Rx (a field), the algorithm is the paper's Algorithm 4.
 pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
@@ -107,7 +105,7 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> 
                 fixed_m: None,
             },
             ladder,
-            // Without effect in the forward direction.
+            // It has no effect in the direction to Rx.
             &reached,
             &reached,
         );
@@ -126,7 +124,7 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> 
 
 /// Returns the chain that the relays of `mission` agree on by the paper's Algorithm 1.
 ///
-/// If the interference is known only along the line (a field), it is Algorithm 4.
+/// If the interference is known only along the line Tx-Rx (a field), it is Algorithm 4.
 pub fn settled(mission: &Mission) -> Result<Chain, FigureError> {
     let common = |_| mission.config().common;
     let agreed = plan::solve(mission, Schedule::Bracketed, common)?;
@@ -153,7 +151,7 @@ pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
     sirs.into_iter().reduce(f64::min).unwrap_or(0.0)
 }
 
-/// Result of a simulated chain that has settled.
+/// Result of a simulated chain after its positions have become final.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
     /// Positions of the relays in order from Tx to Rx.
@@ -162,7 +160,7 @@ pub struct Flown {
     pub sir: f64,
     /// SIR of the worst hop before Algorithm 2 and after each of its rounds, linear.
     pub rounds: Vec<f32>,
-    /// Number of passes of messages along the chain until it settled.
+    /// Number of passes of messages along the chain until its positions were final.
     pub sweeps: u32,
     /// Number of frames sent on all links.
     pub messages: u64,
@@ -170,9 +168,9 @@ pub struct Flown {
     pub bytes: u64,
 }
 
-/// Simulates the chain of `mission` until it settles.
+/// Simulates the chain of `mission` until its positions are final.
 ///
-/// With `predict` the leader first solves the whole chain from the mission.
+/// With `predict` the leader first computes the whole chain from the mission.
 pub fn fly(
     mission: &Mission,
     method: Method,

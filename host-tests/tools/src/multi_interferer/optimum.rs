@@ -1,31 +1,31 @@
-//! The best chain against the true sum of the interference, for relays at one fixed altitude.
+//! Best chain against the true sum of the interference, for relays at one fixed altitude.
 
 use uav_relay_scenario::hypothetical::{Centre, graded};
 use uav_relay_scenario::scene::Scene;
 
-/// Relative width of the interval around the best target SIR at which the bisection ends.
+/// Relative width of the interval of target SIRs at which the bisection ends.
 const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
 
 /// Relative tolerance of the minimum separation, for rounding.
 ///
-/// Without it a thousand relays that just fit on the line could be rejected.
+/// Without it a thousand relays that just fit between Tx and Rx could be rejected.
 const ROUNDING: f64 = 1e-12;
 
-/// Best chain of relays at one altitude: their positions and the SIR.
+/// Best chain of relays at one altitude: their positions and its SIR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
     /// Positions (x, altitude) of the relays from Tx to Rx, m.
     ///
-    /// x is between 0 (Tx) and the distance to Rx. From each relay to the next, x rises by at least the minimum
-    /// separation, except for rounding (1e-12 of the separation).
+    /// x is between 0 (Tx) and the distance to Rx. From one relay to the next it rises by the minimum separation or
+    /// more, except for rounding (1e-12 of the separation).
     pub places: Vec<(f64, f64)>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
     /// SIR of the best chain without a minimum separation, linear.
     ///
-    /// It equals `sir` where the separation does not restrict the chain.
+    /// It equals `sir` if the separation does not restrict the chain.
     pub free_sir: f64,
 }
 
@@ -36,18 +36,20 @@ impl Chain {
     }
 }
 
-/// Returns the best chain of relays at one common altitude, with any powers; exact except for rounding.
+/// Returns the best chain of relays at one common altitude; exact except for rounding.
+///
+/// The powers of the relays may differ. If the minimum separation binds, it is the best of the chains that keep it.
+/// Without a minimum separation, relays may share a position if another hop is the worst.
+///
+/// `None` without relays or interferers, if altitudes differ, if the relays do not fit between Tx and Rx, and if no
+/// chain has an SIR above zero (an interferer at Rx).
 ///
 /// Tested to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
 /// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in
 /// `host-tests/tests/multi_interferer`).
 ///
-/// If the minimum separation binds, the SIR is the best of the chains that keep it. Without a minimum separation,
-/// relays may share a position when another hop is the bottleneck. `None` without relays or interferers, if altitudes
-/// differ, if the relays do not fit on the line, and if no chain has an SIR above zero (an interferer at Rx).
-///
-/// Work: about 50 targets, twice with a minimum separation. For each target: some thousand points of the line per
-/// change of power along the chain, and a few intervals per relay.
+/// Work: about 50 target SIRs, twice with a minimum separation. For each target: some thousand points between Tx and Rx
+/// per change of power along the chain, and a few intervals per relay.
 pub fn optimum(scene: &Scene) -> Option<Chain> {
     let altitude_m = scene.relays.first()?.altitude_m;
     let same = |other: f64| other.total_cmp(&altitude_m).is_eq();
@@ -77,7 +79,7 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
 
 /// Returns the SIR of the best chain at `altitude_m` that keeps the minimum separation, linear.
 ///
-/// `tolerance` is relative. `None` without relays or interferers, if the relays do not fit on the line, and if no
+/// `tolerance` is relative. `None` without relays or interferers, if the relays do not fit between Tx and Rx, and if no
 /// chain has an SIR above 0.
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
@@ -91,7 +93,7 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
         return None;
     }
     let met = |target: f64| Stages::new(line, target, apart).is_some_and(|found| found.is_met());
-    // No chain is better than its first hop.
+    // No chain is better than its first hop at the best position.
     let whole = Span {
         low: 0.0,
         high: scene.distance_m,
@@ -116,25 +118,25 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
     Some(below)
 }
 
-/// Number of intervals into which the range of altitudes is divided for the first scan.
+/// Number of intervals of altitude in the first scan.
 ///
-/// The range is divided twice: into intervals of equal length, and into intervals of equal ratio.
+/// The range of altitudes is divided twice: into intervals of equal length, and into intervals of equal ratio.
 const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;
 
-/// Number of golden-section steps that refine a maximum over altitude.
+/// Number of golden-section steps that refine the best altitude.
 ///
-/// They reduce the interval to 6e-6 of its length; the loss in SIR falls with the square of the interval's length.
+/// They reduce the interval to 6e-6 of its length. The loss in SIR falls with the square of the interval's length.
 const STEPS: u32 = 25;
 
 const COMMON_TOLERANCE: f64 = 1e-11;
 
-/// Returns the best chain whose relays share one altitude within the permitted range of altitudes.
+/// Returns the best chain whose relays share one permitted altitude.
 ///
-/// It is never worse than at the lowest or the highest altitude. Scans the range and refines the three highest
-/// maxima; a narrower maximum between scanned altitudes may be missed. `None` as for [`optimum`](super::optimum()),
-/// if a relay has a fixed altitude of its own, and for an empty range. The cost is about 120 times that of
+/// It is never worse than at the lowest or the highest altitude. The range is scanned, and the three highest maxima are
+/// refined. A narrower maximum between scanned altitudes may be missed. `None` as for [`optimum`](super::optimum()), if
+/// a relay has a fixed altitude of its own, and for an empty range. The cost is about 120 times that of
 /// [`optimum`](super::optimum()).
 pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     let band = scene.band;
@@ -172,7 +174,7 @@ pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     at_altitude(scene, best.0)
 }
 
-/// Returns the altitudes from `least` to `most` to scan, m, in rising order. Equal limits give a single altitude.
+/// Returns the altitudes to scan from `least` to `most`, m, ascending; one if the limits are equal.
 fn altitudes(least: f64, most: f64) -> Vec<f64> {
     let shares = (0..=SCANNED).map(|i| f64::from(i) / f64::from(SCANNED));
     let mut altitudes: Vec<f64> = shares
@@ -214,17 +216,19 @@ pub(super) fn golden(
     if a.1 < b.1 { b } else { a }
 }
 
-// Exact sets of positions from which each relay's part of the chain can reach Rx. They belong to one target SIR and altitude.
+// Positions of each relay from which the rest of the chain can reach Rx, for one target SIR and altitude.
 //
-// For a receiver at y the SIR of a hop depends only on its length, so the sender may be anywhere in [y - d(y), y - s]: d(y) the
-// hop range at the target, s the minimum separation. Backwards from Rx, the feasible positions of relay k are the union of these
-// intervals over those of relay k + 1. Over an interval of y with d(y) >= s this union is again an interval, from the least y -
-// d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
-// target can be bisected.
+// For a receiver at y the SIR of a hop depends only on its length. The sender may therefore be anywhere in [y - d(y), y
+// - s]: d(y) is the longest hop at the target, and s the minimum separation. From Rx backward, the feasible positions
+// of relay k are the union of these intervals over the positions of relay k + 1.
+//
+// Over an interval of y with d(y) >= s this union is again an interval, from the least y - d(y) on, so each set is a
+// few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best target can be found
+// by bisection.
 
-/// Group of feasible hops from one relay to the next, as an interval of x for each of the two relays.
+/// Group of feasible hops: an interval of x for the sender, and one for the receiver.
 ///
-/// A sender at any x in `from` has at least one x in `to` at which the next relay meets the target SIR.
+/// A sender at any x in `from` has at least one x in `to` at which the receiver meets the target SIR.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     from: Span,
@@ -238,20 +242,20 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Intervals of x in which each relay may be, so that all hops from there to Rx meet one target SIR.
+/// Intervals of x of each relay from which all later hops can meet one target SIR.
 ///
 /// They are computed from Rx to Tx. The hop from Tx to the first relay is not checked.
 pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
     target: f64,
-    /// Feasible hops sent by relays N - 1, N - 2, and so on to 1, in this order.
+    /// Feasible hops that relays N - 1, N - 2, ..., 1 send, in this order.
     before: Vec<Stage>,
-    /// Positions of relay 1 from which all hops on to Rx can meet the target SIR.
+    /// Positions of relay 1 from which all later hops can meet the target SIR.
     first: Vec<Span>,
 }
 
-/// Data of feasible hops for one target SIR and one transmit power, reused for relays of equal power.
+/// Feasible hops for one target SIR and one transmit power. Relays of equal power share them.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -261,8 +265,8 @@ struct Reach {
 impl<'a> Stages<'a> {
     /// Computes the feasible positions of each relay for the SIR `target` (linear, > 0).
     ///
-    /// Relays are at least `apart` metres apart. `None` if a relay has no feasible position. The cost is a scan of
-    /// the sampled positions for each change of power along the chain, and a few intervals for each relay.
+    /// Relays are at least `apart` metres apart. `None` if a relay has no feasible position. The cost is a scan of the
+    /// sampled positions for each change of power along the chain, and a few intervals for each relay.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
         let (last, others) = line.scene.relays.split_last()?;
         let mut spans = vec![Span {
@@ -297,7 +301,7 @@ impl<'a> Stages<'a> {
         })
     }
 
-    /// Returns true if the whole chain meets the target, with the hop from Tx to the first relay.
+    /// Returns true if the whole chain meets the target, including the hop from Tx.
     pub(super) fn is_met(&self) -> bool {
         let best = self.line.best_first(&self.first);
         best.is_some_and(|x| self.line.first_sir(x) >= self.target)
@@ -305,8 +309,8 @@ impl<'a> Stages<'a> {
 
     /// Returns the x of each relay, m, in a chain that meets the target SIR. [`Stages::is_met`] must be true.
     ///
-    /// The x rise from Tx to Rx. Each relay divides the rest of the line among the remaining hops as evenly as the
-    /// target allows. `None` if the feasible positions are not connected.
+    /// The x rise from Tx to Rx. The hops are as equal as the target allows. `None` if the feasible positions are not
+    /// connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;
@@ -328,14 +332,14 @@ impl<'a> Stages<'a> {
         }))
     }
 
-    /// Returns the feasible x of the next relay that is nearest to `wish`; the sender is at `x`.
+    /// Returns the feasible x of the next relay that is nearest to `wish`.
     ///
-    /// `stage` has the feasible hops of this sender. `None` if no feasible hop starts at `x`.
+    /// The sender is at `x`, and `stage` has its feasible hops. `None` if no feasible hop starts at `x`.
     fn next_place(&self, stage: &Stage, x: f64, wish: f64) -> Option<f64> {
         let steps = stage.steps.iter().filter(|step| step.from.contains(x));
         let places = steps.map(|step| {
             let near = x + self.apart;
-            // `sure` hears x: either it is close enough, or it is the position with the farthest reach back.
+            // `sure` receives the sender at x: it is close enough, or it is the receiver with the longest hop.
             let sure = step.farthest.max(near).min(step.to.high);
             let wish = wish.clamp(step.to.low.max(near).min(sure), step.to.high);
             toward(sure, wish, |y| self.line.heard_from(stage.stride, y) <= x)
@@ -344,10 +348,9 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the feasible hops from a relay to the next relay, which must be in an interval of `spans`.
+/// Returns the feasible hops from a relay to the next relay, which is in an interval of `spans`.
 ///
-/// Each hop meets the target SIR with the sender's power, for which `reach` is computed, and is at least `apart` metres
-/// long. The search calls this for each relay, from the last relay but one back to the first relay.
+/// Each hop meets the target SIR, and is at least `apart` metres long. `reach` is for the sender's power.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -368,7 +371,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns the last point on the way from `sure` to `wish` up to which `holds` returns true.
+/// Returns the last point from `sure` toward `wish` up to which `holds` returns true.
 ///
 /// `holds` must be true at `sure`.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
@@ -384,26 +387,25 @@ const STEP: f64 = 0.02;
 
 const CELLS: f64 = 500.0;
 
-/// Line of possible relay positions at one altitude above Tx-Rx, with samples of the interference.
+/// Possible relay positions at one altitude above the line Tx-Rx, with samples of the interference.
 ///
 /// The samples are dense enough to show every minimum and maximum of the interference.
 pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Relative hop range at the sampled positions: (I + N)^(-1/2), in W^(-1/2).
+    /// Longest hop to each sampled position, apart from a factor: (I + N)^(-1/2), in W^(-1/2).
     ///
-    /// I and N are the powers of interference and noise at the hop's receiver, W. A factor, [`Stride`], turns the
-    /// value into metres.
+    /// I and N are the powers of interference and noise at the receiver, W. The factor is a [`Stride`].
     quiet: Vec<f64>,
     slope: Vec<f64>,
     tops: Vec<f64>,
 }
 
-/// Factor that gives the range of a hop, m, for one target SIR and one transmit power.
+/// Factor of the longest hop, for one target SIR and one transmit power.
 ///
-/// The range is this factor times (I + N)^(-1/2), with the powers I and N of interference and noise at the receiver,
-/// W.
+/// The longest hop, m, is this factor times (I + N)^(-1/2), with the powers I and N of interference and noise at the
+/// receiver, W.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stride(f64);
 
@@ -417,7 +419,8 @@ impl<'a> Line<'a> {
                 width: source.y_m.hypot(altitude_m),
             })
             .collect();
-        // The interference of an area bends at its corners, and where its boundary crosses the line.
+        // The interference from an area has a kink at each corner, and at each crossing of its boundary with the line
+        // Tx-Rx.
         for area in scene.areas.values() {
             let corners = area.corners();
             for ([x, y], [to_x, to_y]) in corners.iter().zip(corners.iter().cycle().skip(1)) {
@@ -482,33 +485,30 @@ impl<'a> Line<'a> {
             .max_by(|&a, &b| self.first_sir(a).total_cmp(&self.first_sir(b)))
     }
 
-    /// Returns the factor for the range of hops from a relay of `power_w` W.
-    ///
-    /// Each hop has to meet the SIR `target` (linear, above 0).
+    /// Returns the factor of the longest hop from a relay of `power_w` W at the SIR `target` (linear, > 0).
     pub(super) fn stride(&self, power_w: f64, target: f64) -> Stride {
         Stride((power_w / (self.scene.mu_los * target)).sqrt())
     }
 
-    /// Returns the smallest x of a sender, m, that gives a receiver at `x` the target SIR.
+    /// Returns the smallest x of a sender, m, from which a receiver at `x` has the target SIR.
     ///
-    /// `stride` is the range factor for the target SIR and the sender's power. The result may lie behind Tx (below
-    /// 0).
+    /// `stride` is the factor for the target SIR and the sender's power. The result may be behind Tx (below 0).
     pub(super) fn heard_from(&self, stride: Stride, x: f64) -> f64 {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// Returns the x of a receiver at which its sender can be farthest back, toward Tx.
+    /// Returns the x of the receivers whose sender can be closest to Tx, as minima.
     ///
-    /// These are the minima of [`Line::heard_from`] over the receiver's x.
+    /// They are the minima of [`Line::heard_from`] over the receiver's x.
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
-        // The slope of `heard_from` is 1 - stride x slope of the quiet.
+        // The slope of `heard_from` is 1 - stride x slope of `quiet`.
         let level = 1.0 / stride.0;
         falling(&crossings(&self.nodes, &self.slope, level, |x| {
             self.quiet_and_slope(x).1
         }))
     }
 
-    /// Returns the intervals of x in which a receiver meets the target at `apart` metres from its sender.
+    /// Returns the intervals of x in which a receiver meets the target `apart` metres from its sender.
     pub(super) fn hearing(&self, stride: Stride, apart: f64) -> Vec<Span> {
         let level = apart / stride.0;
         let turns = crossings(&self.nodes, &self.quiet, level, |x| {
@@ -529,7 +529,7 @@ impl<'a> Line<'a> {
         spans
     }
 
-    /// Returns the smallest x, m, at which the last relay meets the SIR `target` at Rx; at least 0.
+    /// Returns the smallest x, m, from which the last relay meets the SIR `target` at Rx; at least 0.
     ///
     /// The relay has `power_w` watts; `target` is linear and above 0. `None` if the target is missed even above Rx.
     pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
@@ -540,7 +540,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the positions of the crossings in `turns` at which the function falls through its level.
+/// Returns those positions of `turns` at which the function falls through its level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()
@@ -609,20 +609,20 @@ mod tests {
     }
 }
 
-/// Largest number of bisection steps. After fewer steps any f64 interval in metres has shrunk to two adjacent numbers.
+/// Largest number of bisection steps. Any f64 interval in metres shrinks to two adjacent numbers before.
 const HALVINGS: u32 = 200;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     pub(super) at: f64,
-    /// True if the function whose level is crossed rises at this point; false if it falls.
+    /// True if the function rises through its level here; false if it falls.
     pub(super) rising: bool,
 }
 
-/// Returns the points, in rising order, at which the function `exact` crosses `level`.
+/// Returns the points, ascending, at which the function `exact` crosses `level`.
 ///
-/// `nodes` are arguments in rising order, `values` the function's values there. Two crossings between neighbouring
-/// nodes are missed. The cost is about 60 evaluations for each crossing.
+/// `nodes` are arguments in ascending order, and `values` the function's values there. Two crossings between
+/// neighbouring nodes are missed. The cost is about 60 evaluations for each crossing.
 pub(super) fn crossings(
     nodes: &[f64],
     values: &[f64],

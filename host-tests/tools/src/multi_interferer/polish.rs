@@ -1,26 +1,26 @@
 //! Local search that improves any chain against the true sum, one relay at a time.
 //!
-//! Moving a relay changes two hops: the one that it receives and the one that it sends. The relay moves, between its neighbours,
-//! to maximise the worse of the two; passes along the chain and back spread the gain. The search improves an approximate
-//! placement but cannot move the chain to the other side of an interferer.
+//! Moving a relay changes two hops: the one that it receives, and the one that it sends. Each relay moves between its
+//! neighbours so that the worse of its two hops is best. This is repeated along the chain and back. The search improves
+//! a placement, but cannot move the chain to the other side of an interferer.
 
 use super::optimum::golden;
 use uav_relay_scenario::scene::{Corridor, Place, Relay, Scene, Sender};
 
 const ROUNDS: u32 = 200;
 
-/// Smallest relative gain in SIR for which a round of the local search counts as progress.
+/// Smallest relative gain in SIR for which a round counts as progress.
 const GAIN: f64 = 1e-6;
 
-/// Number of consecutive rounds without progress after which the local search ends.
+/// Number of consecutive rounds without progress after which the search ends.
 ///
 /// It is above 1, because a round without progress may prepare the gain of the next.
 const PATIENCE: u32 = 3;
 
-/// Number of equal steps along x in the scan for a relay's best position, before it is refined.
+/// Number of equal steps along x in the first scan for a relay's best position.
 const PLACES: u32 = 16;
 
-/// Number of equal steps in which the first round scans a relay's altitudes, and its lateral positions.
+/// Number of equal steps in the first round's scan of altitudes, and of lateral positions.
 ///
 /// Later rounds search only one such step on either side of the present value.
 const LEVELS: u32 = 8;
@@ -35,8 +35,7 @@ pub struct Polished {
     pub places: Vec<Place>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
-    /// Number of rounds of the search. In each round the relays are moved one after the other, from relay 1 to the
-    /// last and back.
+    /// Number of rounds. In a round each relay is moved twice: from relay 1 to the last, and back.
     pub rounds: u32,
 }
 
@@ -52,11 +51,12 @@ struct Turn<'a> {
 
 /// Improves the chain `start` by moving one relay at a time within the limits `room`.
 ///
-/// The result is never worse than `start`. Order and minimum separation are kept if the start has them; a relay with a
-/// fixed altitude moves along x and sideways only. The search ends after 200 rounds, or after three rounds in a row
-/// that each gain less than a millionth. A round is 2 N moves. A move computes about 50 SIRs at one altitude, 2 400 in
-/// a band of altitudes, and as many again with lateral room. `None` unless the start has one position per relay and at
-/// least one relay.
+/// The result is never worse than `start`. It keeps order and minimum separation if `start` does. A relay with a fixed
+/// altitude moves along x and sideways only. `None` unless `start` has one position per relay and at least one relay.
+///
+/// The search ends after 200 rounds, or after three rounds in a row that each gain less than a millionth. A round is 2
+/// N moves. A move computes about 50 SIRs at one altitude, and 2 400 in a range of altitudes. Free lateral positions
+/// take another 2 400.
 pub fn polish(
     scene: &Scene,
     start: &[impl Copy + Into<Place>],
@@ -91,8 +91,8 @@ pub fn polish(
 
 /// Moves relay `at` (from 0) if that raises the SIR of the worse of its two hops.
 ///
-/// The relay's altitude and lateral position are searched on both sides of the present values, up to the fraction
-/// `window` of the permitted ranges `room`.
+/// Altitude and lateral position are searched on both sides of the present values, up to the fraction `window` of the
+/// permitted ranges `room`.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
     let relays = &scene.relays;
     let (Some(&own), Some(relay)) = (places.get(at), relays.get(at)) else {
@@ -178,12 +178,10 @@ impl Turn<'_> {
         }
     }
 
-    /// Returns the smallest and largest x, m, that the order and separation of the relays permit.
+    /// Returns the smallest and largest x of the relay, m, at altitude `h` and lateral position `y`.
     ///
-    /// The relay stays between its two neighbours, at the minimum separation from each.
-    ///
-    /// `h` is the relay's altitude and `y` its lateral position, m. The first result is above the second if no x is
-    /// allowed.
+    /// The relay stays between its two neighbours, at the minimum separation from each. The first result is above the
+    /// second if no x is allowed.
     fn room(&self, y: f64, h: f64) -> (f64, f64) {
         let ahead = |apart: f64, other: Place| {
             let across = (y - other.y).powi(2) + (h - other.h).powi(2);
@@ -202,10 +200,10 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
     if other.1 > one.1 { other } else { one }
 }
 
-/// Finds the altitude or lateral position near `own` at which a relay has the best SIR.
+/// Searches the altitude or lateral position near `own` at which a relay has the best SIR.
 ///
-/// `at` returns the relay's best position and its SIR for a given altitude or lateral position; the best of these is
-/// returned. `window` is the fraction of the range `least` to `most` that is searched on either side.
+/// `at` returns the relay's best position and its SIR for a given altitude or lateral position. `window` is the
+/// fraction of the range `least` to `most` that is searched on either side.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

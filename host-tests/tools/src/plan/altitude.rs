@@ -1,6 +1,6 @@
-//! Plans with free altitudes and sides against one interferer, by the solver of the joint method.
+//! Plans with free altitudes and lateral positions against one interferer, by the joint method.
 //!
-//! Positions follow the rules of the sweep that settles the relays on board.
+//! The positions are those that the relays agree on in flight.
 
 use core::task::Poll;
 
@@ -21,7 +21,7 @@ type Chain = Solver<MOST, { MOST / 10 }>;
 /// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
 ///
 /// With fitted slots (as long as each hop needs) the positions have the largest data rate. If the method finds no
-/// positions, the relays keep the altitudes that the scenario gives them.
+/// positions, the relays keep the altitudes of the scenario.
 ///
 /// # Errors
 /// [`NoPlan`] if the scenario is not a valid mission, or for fitted slots with a table of rate steps.
@@ -39,12 +39,12 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
             };
             Ok(briefed.plan(&places, how, false))
         }
-        // The relays do the same: they stay at their own altitudes.
+        // Relays in flight also keep their own altitudes then.
         None => source::best(scenario, relays, tolerance),
     }
 }
 
-/// Returns the relays' positions and altitudes by the joint method. `None` if the method finds no positions.
+/// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
 fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     let mission = &briefed.mission;
     solved(mission, |index| {
@@ -53,11 +53,11 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     })
 }
 
-/// Returns the relays' positions and altitudes by the joint method. `None` if it finds no positions.
+/// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
 ///
-/// Computes without messages what the relays compute on board: the solution of the whole chain, then the pass of
-/// messages along the chain that fixes each position. `seat_of` returns the power of a relay and the altitudes and
-/// lateral positions that it may choose from.
+/// It computes without messages what the relays compute on board: the solution for the whole chain, and then the
+/// messages along the chain that fix each position. `seat_of` returns a relay's power, and the altitudes and lateral
+/// positions that it may choose.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
     let target = loop {
@@ -96,7 +96,7 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
         link_of(index).extend(&[target], &[from_m], &mut reaches);
         let mut x_m = *reaches.first()?;
         if index == mission.relays() {
-            // With a way back the last relay may stop before its reach.
+            // With data in both directions the last relay may stop before its reach.
             (_, x_m) = link_of(index).ending(target, from_m, x_m)?;
         }
         places.push(own_of(index).cross_section.at(x_m));
@@ -115,7 +115,7 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
     Some(places)
 }
 
-/// Number of common altitudes that are tried, to find an upper limit for the fewest relays.
+/// Number of common altitudes that are tried for the upper limit of the fewest relays.
 const LEVELS: u8 = 9;
 
 /// Returns the plan with the fewest relays that give every hop the SIR `target`, with free altitudes.
@@ -130,9 +130,9 @@ pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result
 
 /// Returns the plan with the fewest relays that give every hop the SIR `target`, by bisection.
 ///
-/// The upper limit of the search is the fewest relays at one common altitude, which `at_level` plans for several
-/// altitudes. `free` plans a given number of relays with free altitudes. The search assumes that more relays never
-/// have a lower SIR.
+/// The upper limit of the search is the fewest relays at one common altitude; `at_level` plans them for one altitude.
+/// `free` plans a given number of relays with free altitudes. The search assumes that more relays never have a lower
+/// SIR.
 pub(super) fn fewest_of(
     scenario: &Scenario,
     target: f64,

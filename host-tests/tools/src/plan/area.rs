@@ -1,17 +1,17 @@
 //! Plans for interferers that may be anywhere in an area, and plans around no-fly areas.
 //!
-//! The SIR of a hop is least if each interferer is at the point of its area nearest to the hop's receiver. Only one hop is the worst
-//! one, and all interferers can be at the points nearest to its receiver. So the worst case of the chain's SIR over the areas
-//! is the least SIR of its hops with the interferers nearest to each receiver ([`Scene::areas`]): the search for
-//! positions is that for a known interference at each receiver.
+//! The SIR of a hop is least if each interferer is at the point of its area nearest to the hop's receiver. The chain
+//! has the SIR of its worst hop, and all interferers can be nearest to the receiver of that hop. The worst case of the
+//! chain's SIR is therefore the least SIR of its hops, each with the interferers nearest to its receiver
+//! ([`Scene::areas`]). So the search for positions is that for a known interference at each receiver.
 //!
 //! | positions | method |
 //! | --- | --- |
 //! | one altitude, one direction | the exact optimum for the sum of the interferers |
-//! | other | dynamic programming on a grid of positions, then in windows around the relays that become narrower |
-//! | quantile | the same against the most harmless draws of the interferers' positions and powers, which are chosen again until the quantile no longer rises |
+//! | other | dynamic programming on a grid of positions, then in ever narrower windows around the relays |
+//! | quantile | the same, against random draws of the interferers' positions and powers without the worst draws; this is repeated until the quantile no longer rises |
 //!
-//! Chains whose ways between neighbours cross no no-fly area come first.
+//! Chains with no path between two neighbours through a no-fly area come first.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt as _, SeedableRng as _};
@@ -26,59 +26,61 @@ use uav_relay_sim::report::db;
 use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, fewest_of, fitted_radio, source};
 use crate::multi_interferer::{best_common_altitude, optimum};
 
-/// Largest number of relays for which positions are searched on a grid.
+/// Largest number of relays in a search on a grid.
 const MOST_SEARCHED: u16 = 50;
 
 /// Quantile that is reported if no other quantile is requested.
 pub const QUANTILE: f64 = 0.95;
 
-/// Numbers of draws of the interferers: first to optimise a quantile, second to compute its result.
+/// Numbers of random draws of the interferers: to optimise a quantile, and to compute its result.
 const DRAWS: [usize; 2] = [400, 4000];
 
-/// Seed of the draws, so that equal scenarios have equal plans.
+/// Seed of the random draws. It is fixed, so that equal scenarios have equal plans.
 const SEED: u64 = 36;
 
-/// Largest number of rounds of the search for a quantile. Each round leaves out the draws with the lowest SIRs.
+/// Largest number of rounds of the search for a quantile. Each leaves out the draws with the lowest SIRs.
 const ROUNDS: u32 = 8;
 
-/// Factor for the SIR of a hop that crosses a no-fly area. It ranks such chains behind all others.
+/// Factor for the SIR of a hop whose path crosses a no-fly area. Such chains rank behind all others.
 const CROSSING: f64 = 1e-30;
 
-/// Tolerance for rounding, m: depth in a no-fly area, or length of a path in it, that does not count.
+/// Length that counts as 0 because of rounding, m: depth in a no-fly area, or length of a path in it.
 const ROUNDING_M: f64 = 0.01;
 
-/// Numbers of x, y and altitudes of the first grid. A coordinate that a relay may not choose has one value.
+/// Numbers of steps in x, y and altitude of the first grid, if a relay may choose them.
 const GRID: [u32; 3] = [40, 7, 5];
 
-/// Largest number of search windows around the relays, and factor on the width of a window. The factor applies to a
-/// window that gains little.
+/// Largest number of searches in windows around the relays, and factor on the width of a window.
+///
+/// The factor applies after a search that gains little.
 const WINDOWS: (u32, f64) = (120, 0.6);
 
-/// Largest number of times that the windows begin again with their full width.
+/// Largest number of times that the windows start again with their full width.
 const RESTARTS: u32 = 5;
 
-/// Width of the narrowest window along x, relative to the line.
+/// Width of the narrowest window along x, as a fraction of the distance Tx-Rx.
 const NARROWEST: f64 = 1e-7;
 
-/// Criterion by which positions are chosen.
+/// Criterion for the choice of positions.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Criterion {
-    /// Fraction of cases, 0.5 to 0.99, in which the chain has at least the SIR that is maximised. A case is one
-    /// choice of the interferers' positions and powers within their areas. `None` to maximise the SIR of the worst
-    /// case.
+    /// Fraction of cases, 0.5 to 0.99, that are to have at least the maximised SIR.
+    ///
+    /// A case is a choice of the interferers' positions and powers within their limits. `None` to maximise the SIR of
+    /// the worst case.
     pub quantile: Option<f64>,
-    /// True if the ways between neighbours may cross no-fly areas.
+    /// True if the path between two neighbours may cross a no-fly area.
     pub allow_crossing: bool,
 }
 
-/// Plans the positions that `ask` requests, for interferers in areas and outside no-fly areas.
+/// Plans the positions that `ask` requests, for interferers in areas and with no-fly areas.
 ///
-/// With a quantile the positions maximise this quantile of the SIR over the areas, otherwise the SIR of the worst
-/// case. The SIRs in the plan are always for the worst case.
+/// With a quantile, the positions maximise this quantile of the SIR, otherwise the SIR of the worst case. The SIRs in
+/// the plan are always for the worst case.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest, criterion: Criterion) -> Result<Plan, NoPlan> {
     let wrong = |line: &str| Err(NoPlan::Wrong(line.to_owned()));
     if scenario.areas.is_empty() {
-        // Without areas the plan that ignores the no-fly areas is best, if it can be flown.
+        // Without areas the plan that ignores the no-fly areas is best, if it avoids them.
         let blind = super::plan(&anywhere(scenario), ask)?;
         let is_field = matches!(scenario.interference, Interference::Field(_));
         let allow_crossing = criterion.allow_crossing;
@@ -130,7 +132,7 @@ pub fn at_centre(scenario: &Scenario) -> Scenario {
     }
 }
 
-/// Returns a mission for the profiles of the relays. Its interferer is one of several, and is not used.
+/// Returns a mission for the profiles of the relays. It has only one of the interferers, which is not used.
 pub(super) fn profiles(
     scenario: &Scenario,
     relays: u16,
@@ -238,7 +240,7 @@ fn places_of(plan: &Plan) -> Vec<Place> {
 /// Position x, y and altitude, m.
 type Point = [f64; 3];
 
-/// Returns the paths of two neighbours: each flies to the other's position to close a gap in the chain.
+/// Returns the paths of two neighbours that close a gap: each flies to the other's position.
 ///
 /// A relay flies straight to its new position. A relay that `keeps` its altitude, as with Algorithm 1, flies level.
 pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {
@@ -249,7 +251,7 @@ pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {
     ]
 }
 
-/// End of the line about a way that crosses a no-fly area.
+/// End of the text about a path that crosses a no-fly area.
 pub const ACCEPTS: &str = "; `cargo plan --allow-crossing` accepts it";
 
 fn point(at: &Placement) -> Point {
@@ -261,10 +263,10 @@ pub(super) fn range(area: &NoFly) -> String {
     format!("{} ({low} to {high} m)", area.key)
 }
 
-/// Returns the reason why relays cannot be at these positions; `None` if they can.
+/// Returns the reason why relays cannot be at the positions `chain`; `None` if they can.
 ///
-/// Relays choose their altitudes in flight if `is_free`, apart from those with an altitude of the scenario. Ways between neighbours that
-/// cross a no-fly area are no reason if `allow_crossing`.
+/// If `is_free`, relays choose their altitudes in flight, except relays with an altitude in the scenario. With
+/// `allow_crossing`, a path between neighbours through a no-fly area is no reason.
 pub fn problem(
     scenario: &Scenario,
     chain: &[Placement],
@@ -318,7 +320,7 @@ fn inside(area: &NoFly, index: u16, [x, y, h]: Point) -> Option<String> {
     ))
 }
 
-/// Returns a line for each relay that flies through a no-fly area, or into it.
+/// Returns a text for each relay that flies through a no-fly area, or into it.
 ///
 /// The relays `indices` fly from their positions `from` to those in `to`.
 pub(super) fn entered(
@@ -346,7 +348,7 @@ pub(super) fn entered(
     lines
 }
 
-/// Possible position of a node, with the interference plus noise there, W.
+/// Possible position of a node, and the interference plus noise there, W.
 #[derive(Clone, Copy)]
 struct Spot {
     at: Place,
@@ -359,7 +361,7 @@ struct Search<'a> {
     no_fly: &'a [NoFly],
     is_free: bool,
     allow_crossing: bool,
-    /// Draws of the interferers that decide the quantile; empty for the worst case.
+    /// Random draws of the interferers that count for the quantile; empty for the worst case.
     draws: Vec<Vec<Source>>,
 }
 
@@ -402,7 +404,7 @@ impl<'a> Search<'a> {
         self.spot(Place { x, y: 0.0, h: 0.0 }, self.scene.mu_nlos)
     }
 
-    /// Returns the possible positions of relay `relay` (from 0) among `x`, `y` and altitudes `h`.
+    /// Returns the allowed positions of relay `relay` (from 0) among `x`, `y` and altitudes `h`.
     fn spots(&self, relay: usize, [x, y, h]: &[Vec<f64>; 3]) -> Vec<Spot> {
         let held = self.scene.relays.get(relay);
         let held = held.filter(|relay| relay.holds || !self.is_free);
@@ -419,7 +421,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Returns the SIR of the hop to node `node`, linear; 0 if its relays are too close. Node 0 is Tx.
+    /// Returns the SIR of the hop to node `node`, linear; 0 if the two relays are too close. Node 0 is Tx.
     fn hop(&self, node: usize, from: Spot, to: Spot) -> f64 {
         let scene = self.scene;
         let relays = &scene.relays;
@@ -438,7 +440,7 @@ impl<'a> Search<'a> {
         }
         let factor = if is_inner { scene.mu_los } else { scene.eta };
         let tx_w = behind.map_or(scene.tx_w, |relay| relay.power_w);
-        // Relays at one position are no bottleneck.
+        // The SIR of relays at one position is unlimited.
         let there = (tx_w / (factor * squared) / to.disturbance_w).min(f64::MAX);
         if !(scene.reverse > 0.0) {
             return there;
@@ -447,7 +449,7 @@ impl<'a> Search<'a> {
         there.min(rx_w / (factor * squared) / from.disturbance_w / scene.reverse)
     }
 
-    /// Returns the factor for a hop's SIR: [`CROSSING`] if its relays' paths cross a no-fly area, else 1.
+    /// Returns the factor for a hop's SIR: [`CROSSING`] if a path crosses a no-fly area, else 1.
     fn preference(&self, node: usize, from: Spot, to: Spot) -> f64 {
         let is_inner = node > 1 && node <= self.scene.relays.len() && !self.allow_crossing;
         let keeps = |relay: usize| {
@@ -468,9 +470,12 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns the chain with the best worst hop, and this hop's SIR. Relay k is at a spot of `grids[k - 1]`.
+    /// Returns the chain with the best worst hop, and the SIR of this hop.
+    ///
+    /// Relay k is at a spot of `grids[k - 1]`.
     fn best_on(&self, grids: &[Vec<Spot>]) -> Option<(Vec<Spot>, f64)> {
-        // For each spot of a relay: the worst hop up to it, and the spot of the relay before it. The best ones are first.
+        // For each spot of a relay: the SIR of the worst hop so far, and the index of the previous spot. The best spots
+        // are first.
         let mut layers: Vec<Vec<(f64, Spot, usize)>> = Vec::new();
         let mut before = vec![(f64::INFINITY, self.site(0), 0)];
         let last = [self.site(1)];
@@ -525,12 +530,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns the best chain found from a grid and from `starts`.
+    /// Returns the best chain found from a grid and from the chains `starts`.
     fn best(&self, starts: &[Vec<Place>]) -> Option<Vec<Place>> {
         let room = self.room();
         let is_single = room.iter().skip(1).all(|[low, high]| low >= high);
         let relays = u32::try_from(self.scene.relays.len()).unwrap_or(u32::MAX);
-        // A grid of few relays has room for more positions: its work is that of the positions squared for each hop.
+        // With few relays the grid can be finer. The work for each hop grows with the square of the number of
+        // positions.
         let finer = match relays {
             _ if is_single => [8, 1, 1],
             1 => [8, 6, 4],
@@ -570,7 +576,9 @@ impl<'a> Search<'a> {
         each.map(|at| self.spot(*at, self.scene.eta)).collect()
     }
 
-    /// Returns the chain after moves within windows around all relays, and its SIR. `None` if no allowed position is near.
+    /// Returns the chain after moves within windows around all relays, and its SIR.
+    ///
+    /// `None` if no allowed position is near.
     fn refined(&self, start: &[Spot]) -> Option<(f64, Vec<Place>)> {
         let room = self.room();
         let mut width = room.map(|[low, high]| high - low);
@@ -586,14 +594,14 @@ impl<'a> Search<'a> {
                 for (((axis, own), [low, high]), width) in
                     axes.iter_mut().zip(own).zip(room).zip(width)
                 {
-                    // The steps are not symmetric, so that a relay is not bound to a lattice.
+                    // The steps are not symmetric, so that a relay is not limited to a lattice.
                     let steps = [0.0, -1.0, -0.5, -0.2, 0.23, 0.55, 1.0];
                     let steps = steps.iter().take(if width > 0.0 { 7 } else { 1 });
                     *axis = steps
                         .map(|step| (own + step * width).clamp(low, high))
                         .collect();
                 }
-                // Seven altitudes at each of seven lateral positions would take too long.
+                // All combinations of seven altitudes and seven lateral positions would take too long.
                 if axes.iter().all(|axis| axis.len() > 1) {
                     for axis in axes.iter_mut().skip(1) {
                         *axis = axis
@@ -670,9 +678,9 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Draws of the positions and powers of all interferers.
+/// Random draws of the positions and powers of all interferers.
 ///
-/// A position is uniformly distributed over its area, and a power is uniformly distributed in decibels.
+/// A position is uniform over its area, and a power is uniform in decibels.
 #[derive(Debug)]
 pub struct Draws {
     scene: Scene,
@@ -680,7 +688,7 @@ pub struct Draws {
 }
 
 impl Draws {
-    /// Draws `number` times.
+    /// Creates `number` random draws.
     pub fn new(scenario: &Scenario, scene: &Scene, number: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         let draws = (0..number).map(|_| {
@@ -700,7 +708,7 @@ impl Draws {
         }
     }
 
-    /// Returns the SIR of the worst hop and the number of each draw, by falling SIR.
+    /// Returns the SIR of the worst hop and the index of each draw, by falling SIR.
     fn sirs(&self, chain: &[Place]) -> Vec<(f64, usize)> {
         let mut scene = self.scene.clone();
         let each = self.draws.iter().enumerate().map(|(at, draw)| {
@@ -723,7 +731,7 @@ impl Draws {
         count.clamp(1, self.draws.len())
     }
 
-    /// Returns the SIR that the chain's worst hop has in the fraction `quantile` of all draws, linear.
+    /// Returns the SIR that the chain's worst hop reaches in the fraction `quantile` of the draws, linear.
     pub fn quantile(&self, chain: &[impl Copy + Into<Place>], quantile: f64) -> f64 {
         let chain: Vec<Place> = chain.iter().map(|at| (*at).into()).collect();
         let sirs = self.sirs(&chain);
@@ -731,7 +739,7 @@ impl Draws {
             .map_or(0.0, |(sir, _)| *sir)
     }
 
-    /// Returns the fraction `quantile` of the draws for which the chain has the largest SIRs.
+    /// Returns the draws with the largest SIRs of the chain: the fraction `quantile` of all draws.
     fn most_harmless(&self, chain: &[Place], quantile: f64) -> Vec<Vec<Source>> {
         let sirs = self.sirs(chain).into_iter().take(self.counted(quantile));
         sirs.filter_map(|(_, at)| self.draws.get(at).cloned())
@@ -739,7 +747,7 @@ impl Draws {
     }
 }
 
-/// Largest number of points that are drawn until a point is in the area.
+/// Largest number of random points until one is inside the area.
 const TRIES: u32 = 100_000;
 
 fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
@@ -757,16 +765,18 @@ fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
     Source { power_w, x_m, y_m }
 }
 
-/// SIRs of positions over the areas of the interferers.
+/// SIRs of a chain over the areas of the interferers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct OverArea {
     /// SIR of the worst hop with the interferers at their worst positions and greatest powers, dB.
     pub worst_sir_db: f64,
-    /// SIR that the worst hop reaches in the fraction `quantile` of positions and powers, dB.
+    /// SIR that the worst hop reaches in the fraction `quantile` of all positions and powers, dB.
     pub quantile_sir_db: f64,
 }
 
-/// Report of a plan over the areas of the interferers, in comparison with the plan for their middles.
+/// Report of a plan over the areas of the interferers.
+///
+/// It compares the plan with the plan for interferers in the middle of their areas.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AreaReport {
     /// Criterion of the plan: `worst` or `quantile`.
@@ -776,10 +786,10 @@ pub struct AreaReport {
     /// SIRs of the plan.
     #[serde(flatten)]
     pub plan: OverArea,
-    /// SIRs at the best positions for interferers in the middle of their areas; absent if there are none.
+    /// SIRs of the plan for interferers in the middle of their areas; absent if there is no such plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre: Option<OverArea>,
-    /// Position [x, y] of each interferer with an area at which the worst hop of the plan is worst, m.
+    /// Position [x, y] of each interferer with an area, m, at which the plan's worst hop is worst.
     pub worst_places: Vec<[f64; 2]>,
 }
 
@@ -857,7 +867,7 @@ fn receiver(scene: &Scene, chain: &[Placement]) -> [f64; 2] {
     worst.map_or([0.0; 2], |(_, at)| *at)
 }
 
-/// Cell of the map of SIRs: a square in which the interferer is, and the SIR of the chain's worst hop.
+/// Cell of the map of SIRs: a square with the interferer inside, and the SIR of the worst hop.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cell {
     /// Index of the interferer, from 0.
@@ -866,7 +876,7 @@ pub struct Cell {
     pub at: [f64; 2],
     /// Length of the sides of the cell, m.
     pub side_m: f64,
-    /// SIR of the worst hop, dB, with the interferer in the middle of the cell at its greatest power.
+    /// SIR of the worst hop, dB. The interferer is in the middle of the cell, at its greatest power.
     pub sir_db: f64,
     /// Standard deviation, m, of the position that relays with `[listen]` estimate for an interferer here.
     ///

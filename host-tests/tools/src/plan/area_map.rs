@@ -9,14 +9,14 @@ use uav_relay_scenario::{Line, Scenario};
 use super::Plan;
 use super::area::Cell;
 
-/// Width of the picture, and of its margin, in picture units.
+/// Width of the picture, in picture units, and width of its margin.
 const WIDTH: f64 = 900.0;
 const MARGIN: f64 = 40.0;
 
-/// Greatest height of the picture without margins, relative to its width.
+/// Greatest height of the picture without margins, as a fraction of its width.
 const TALLEST: f64 = 1.2;
 
-/// Colours from the lowest to the highest SIR, red, green and blue. They differ in brightness, too.
+/// Colours from the lowest to the highest SIR: red, green and blue. They also differ in brightness.
 const COLOURS: [[f64; 3]; 5] = [
     [68.0, 1.0, 84.0],
     [59.0, 82.0, 139.0],
@@ -25,7 +25,7 @@ const COLOURS: [[f64; 3]; 5] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// Number of steps of the legend.
+/// Number of steps in the legend.
 const STEPS: u32 = 5;
 
 /// Quantity that a map shows.
@@ -33,12 +33,12 @@ const STEPS: u32 = 5;
 pub enum Shown {
     /// SIR of the worst hop.
     Sir,
-    /// Error of the interferer's position as estimated by relays that measure the interference.
+    /// Error of the interferer's position that relays estimate from measurements.
     Error,
 }
 
 impl Shown {
-    /// Returns the number of a cell on the scale of colours: dB, or the logarithm of metres.
+    /// Returns the value of a cell on the colour scale: dB, or the logarithm of metres.
     fn number(self, cell: &Cell) -> f64 {
         match self {
             Self::Sir => cell.sir_db,
@@ -54,10 +54,10 @@ impl Shown {
     }
 }
 
-/// Largest error that a map distinguishes, m. Larger errors have the same colour.
+/// Largest error on the colour scale, m. Larger errors have the same colour.
 const MOST_M: f64 = 1e5;
 
-/// Returns the picture of `cells` from above: x points to the right, y (right of the line) down.
+/// Returns the picture of `cells` from above. x points to the right, and y (to the right of x) down.
 pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell], shown: Shown) -> String {
     let numbers = || cells.iter().map(|cell| shown.number(cell));
     let (least, most) = (
@@ -149,7 +149,7 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell], shown: Shown) -> St
     out
 }
 
-/// Returns the colour of a share of the range of SIRs, 0 to 1.
+/// Returns the colour of a value, as a fraction of the colour scale, 0 to 1.
 fn colour(share: f64) -> String {
     let place = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     let mut mixed = [0.0; 3];
@@ -163,7 +163,7 @@ fn colour(share: f64) -> String {
     format!("rgb({red},{green},{blue})")
 }
 
-/// Returns the least and the greatest [x, y] of everything in the picture, m.
+/// Returns the least and the greatest x and y in the picture, m.
 fn frame(scenario: &Scenario, relays: &[[f64; 2]], cells: &[Cell]) -> [[f64; 2]; 2] {
     let corners = cells
         .iter()
@@ -191,7 +191,7 @@ fn frame(scenario: &Scenario, relays: &[[f64; 2]], cells: &[Cell]) -> [[f64; 2];
 /// Returns `cells` as the text of a GeoJSON file: a square for each, with `sir_db` and `error_m`.
 ///
 /// # Errors
-/// A line that names a cell that is too far from the line.
+/// A text that names a cell that is too far from the line Tx-Rx.
 pub fn geojson(line: &Line, cells: &[Cell]) -> Result<String, String> {
     let corner = |[x, y]: [f64; 2]| {
         #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
@@ -210,7 +210,7 @@ pub fn geojson(line: &Line, cells: &[Cell]) -> Result<String, String> {
     let feature = |cell: &Cell| {
         let [x, y] = cell.at;
         let half = 0.5 * cell.side_m;
-        // Counter-clockwise seen from above, as the RFC asks for: y is to the right of x.
+        // Counter-clockwise seen from above, as RFC 7946 requires: y is to the right of x.
         let ring = [
             [-1.0, -1.0],
             [-1.0, 1.0],

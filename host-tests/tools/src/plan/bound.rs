@@ -1,42 +1,44 @@
-//! Upper bound on the SIRs of a chain along the line, by interval arithmetic in f64.
+//! Upper bound on the SIRs of a chain on the line Tx-Rx, by interval arithmetic in f64.
 //!
-//! [`excludes`] proves that no positions meet a target. It shares nothing with the search for positions but the path losses. The
-//! range of each relay is divided into cells. A hop between two cells is dropped if it misses the target even at their smallest
-//! distance and with the smallest interference in the receiver's cell, in either direction. A cell that no chain of such hops from
-//! Tx to Rx passes is dropped, and the others are divided further. If a relay has no cell left, the target is excluded. The order
-//! of the relays and their minimum separation are ignored, so the bound also holds without them.
+//! [`excludes`] proves that no positions meet a target. It shares only the path losses with the search for positions.
+//! The range of each relay is divided into cells. A hop between two cells is dropped if it misses the target in either
+//! direction, even at their smallest distance and with the smallest interference in the receiver's cell. A cell is
+//! dropped if no chain of remaining hops from Tx to Rx uses it. The other cells are divided further. If a relay has no
+//! cell left, the target is excluded. The order of the relays and their minimum separation are ignored, so the bound
+//! also holds without them.
 //!
 //! ```text
 //! F <= P(sender) g(d) / (I(cell of the receiver) + N),    B <= P(receiver) g(d) / (I(cell of the sender) + N)
 //! ```
 //!
-//! Work: cells near the positions of a chain whose hops all limit it are few. Where a relay may be anywhere they are many, and the
-//! search gives up without a proof.
+//! Work: few cells remain if every hop limits the SIR of the chain. If the position of a relay hardly matters, many
+//! remain, and the search ends without a proof.
 
 use std::ops::Range;
 
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Number of equal cells along the line Tx-Rx with which the proof begins. A relay may be in any of them.
+/// Number of equal cells between Tx and Rx at the beginning. A relay may be in any of them.
 const FIRST: usize = 256;
 
 /// Number of equal parts into which a cell is divided.
 const PARTS: usize = 4;
 
-/// Largest number of cells of all relays together. With more, the search ends without a proof.
+/// Largest number of cells of all relays together. With more cells, the search ends without a proof.
 const MOST_CELLS: usize = 60_000;
 
-/// Largest number of rounds in which cells are divided. The smallest cells are some 1e-8 of the distance from Tx to
-/// Rx.
+/// Largest number of rounds in which cells are divided.
+///
+/// The smallest cells are some 1e-8 of the distance from Tx to Rx.
 const MOST_LEVELS: usize = 10;
 
-/// Largest number of relays for which a proof is tried.
+/// Largest number of relays in a proof. With more relays no proof is tried.
 const MOST_RELAYS: usize = 200;
 
-/// Allowance for rounding errors in squared lengths, as a fraction of the squared length.
+/// Allowance for rounding errors, as a fraction of a squared length.
 const ROUNDING: f64 = 1e-9;
 
-/// Target SIRs, linear, that every hop must meet. First the target in the direction to Rx, second that in the direction to Tx.
+/// Target SIRs of every hop, linear: in the direction to Rx, and in the direction to Tx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Targets {
     /// Target SIR of each hop in the direction to Rx, linear, above 0.
@@ -45,9 +47,9 @@ pub struct Targets {
     pub back: f64,
 }
 
-/// Returns true if it is proven that no positions along the line meet `targets`.
+/// Returns true if it is proven that no positions on the line Tx-Rx meet `targets`.
 ///
-/// The relays keep their own altitudes. False means only that there is no proof.
+/// The relays keep their own altitudes. False only means that there is no proof.
 pub fn excludes(scene: &Scene, targets: Targets) -> bool {
     let relays = scene.relays.len();
     if relays == 0 || relays > MOST_RELAYS || !(targets.there > 0.0 && targets.there.is_finite()) {
@@ -90,23 +92,23 @@ struct Bound<'a> {
     targets: Targets,
 }
 
-/// Node of the chain during the proof, with the cells (intervals of x) that it may be in, ascending.
+/// Node of the chain with the cells (intervals of x) that it may be in, ascending.
 ///
-/// For each cell, `hears_squared` is the largest squared length, m^2, of a hop that the node can receive there at its
-/// target SIR.
+/// `hears_squared` belongs to the cells. It is the largest squared length, m^2, of a hop that the node can receive
+/// there at its target SIR.
 struct Node<'a> {
     cells: &'a [Range<f64>],
     hears_squared: Vec<f64>,
 }
 
 impl Bound<'_> {
-    /// Drops the cells that no chain of possible hops from Tx to Rx passes.
+    /// Drops the cells that no chain of possible hops from Tx to Rx uses.
     fn drop_cells(&self, cells: &mut [Vec<Range<f64>>]) {
         let distance_m = self.scene.distance_m;
         let ends = [vec![0.0..0.0], vec![distance_m..distance_m]];
         let [tx, rx] = &ends;
         let relays = cells.len();
-        // Each hop is first passed from Tx on, and then from Rx back.
+        // Hops are checked from Tx to Rx, and then from Rx to Tx.
         for at in 0..relays {
             let (before, rest) = cells.split_at_mut(at);
             let Some(here) = rest.first_mut() else { return };
@@ -121,10 +123,10 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns, for each cell of one end of `hop`, true if some cell of the other end allows the hop.
+    /// Returns, for each cell of one end of `hop`, true if a cell of the other end allows the hop.
     ///
-    /// The cells are the receiver's if `of_receiver` is true, otherwise the sender's. The sender is the node nearer
-    /// to Tx.
+    /// The cells are the receiver's if `of_receiver` is true, otherwise the sender's. The sender is the node nearer to
+    /// Tx.
     fn reached(
         &self,
         hop: usize,
@@ -162,9 +164,9 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns a lower bound on the interference power, W, that `node` receives at any position in `cell`.
+    /// Returns a lower bound on the interference power that `node` receives in `cell`, W.
     ///
-    /// Each interferer is received as from the edge of the cell that is farther from it.
+    /// Each interferer is received at the edge of the cell that is farther from it.
     fn least_w(&self, node: usize, cell: &Range<f64>) -> f64 {
         let altitude_m = self.altitude_m(node);
         let factor = match self.relay(node) {
@@ -203,8 +205,9 @@ fn retain(cells: &mut Vec<Range<f64>>, kept: &[bool]) {
     cells.retain(|_| kept.next() == Some(&true));
 }
 
-/// Returns, for each cell of `here`, true if a hop with some cell of `other` meets the target SIRs. The hop must be
-/// short enough for the receiver at each of its ends.
+/// Returns, for each cell of `here`, true if a hop with a cell of `other` meets the target SIRs.
+///
+/// The hop must be short enough for the receiver at each end.
 fn possible(here: &Node<'_>, other: &Node<'_>) -> Vec<bool> {
     let pairs = here.cells.iter().zip(&here.hears_squared);
     pairs
@@ -224,7 +227,7 @@ fn possible(here: &Node<'_>, other: &Node<'_>) -> Vec<bool> {
                 let squared = apart * apart;
                 (squared, squared <= own.min(hears))
             };
-            // Outward from the nearest cells, as far as this one hears.
+            // Outward from the nearest cells, up to the longest hop that this cell can receive.
             let mut onward = (first..other.cells.len()).map(is_near);
             let mut back = (0..first).rev().map(is_near);
             let any = |side: &mut dyn Iterator<Item = (f64, bool)>| {

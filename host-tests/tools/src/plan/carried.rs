@@ -1,4 +1,4 @@
-//! Positions of the largest data rate along the line.
+//! Positions on the line Tx-Rx with the largest data rate.
 //!
 //! | hops | directions | positions |
 //! | --- | --- | --- |
@@ -6,8 +6,8 @@
 //! | equal slots or own channels | both, r < 1 | Algorithm 1 with the ratio of SIRs that both rates need, and a shortest path |
 //! | fitted slots | one or both | a shortest path (`path`) |
 //!
-//! A rate R to Rx and r R back need the SINRs g(R) and g(r R). Their ratio depends on R, and is not r: the logarithm of a rate flattens. So
-//! Algorithm 1 is repeated with the ratio of the rate that it has reached, by bisection.
+//! A rate R to Rx and r R back need the SINRs g(R) and g(r R). Their ratio is not r, and depends on R. So Algorithm 1
+//! is repeated for several R, by bisection, each time with this ratio.
 
 use std::cell::OnceCell;
 
@@ -25,22 +25,22 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
-/// Largest excess of time per bit, relative, for which a number of relays gets a precise search.
+/// Largest relative excess of time per bit; with more, a number of relays gets no precise search.
 ///
-/// The times per bit are those of the best positions on a coarse grid. The excess is relative to the smallest time of
-/// all numbers of relays. A precise search for positions cannot make up for a larger excess.
+/// The times per bit are those on a coarse grid. The excess is relative to the smallest time of all numbers of relays.
+/// A precise search cannot make up for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
 const HALVINGS: u8 = 18;
 
-/// Planner of the relay positions that maximise the data rate of the chain.
+/// Planner of relay positions with the largest data rate.
 #[derive(Debug)]
 pub struct Carried<'a> {
     scenario: &'a Scenario,
     radio: &'a Radio,
     tolerance: f64,
-    /// Largest number of relays for which the table of grid positions is computed.
+    /// Largest number of relays in the table of grid positions.
     most: u16,
     table: OnceCell<Option<Table>>,
 }
@@ -48,9 +48,9 @@ pub struct Carried<'a> {
 impl<'a> Carried<'a> {
     /// Creates the planner for up to `most` relays; `None` if the positions with the best SIR suffice.
     ///
-    /// They suffice if they also maximise the data rate: with equal time slots or a frequency for each hop, for data
-    /// in one direction or at equal rates in both. They also suffice where no better positions are searched: with
-    /// free altitudes, a given x, several interferers, or interference known only along the line.
+    /// They suffice if they also maximise the data rate: with equal time slots or a frequency for each hop, for data in
+    /// one direction or at equal rates in both. They also suffice if no better positions are searched: with free
+    /// altitudes, a given x, several interferers, or interference known only along the line Tx-Rx.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -82,16 +82,17 @@ impl<'a> Carried<'a> {
         table.as_ref()
     }
 
-    /// Returns the largest number of relays for which a precise search for positions is worthwhile.
+    /// Returns the largest number of relays that deserves a precise search.
     ///
-    /// A precise search is used for time slots as long as each hop needs. With more relays, one bit on the coarse grid
-    /// takes over 5 % more time than with the best number of relays. A precise search cannot make up for this.
+    /// With more relays, one bit takes over 5 % more time on the coarse grid than with the best number. A precise
+    /// search cannot make up for this. It is used for fitted time slots (as long as each hop needs).
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }
 
-    /// Returns the positions of `relays` relays with the largest data rate. `relays` is at most `most` of
-    /// [`Carried::new`].
+    /// Returns the positions of `relays` relays with the largest data rate.
+    ///
+    /// `relays` is at most `most` of [`Carried::new`].
     ///
     /// # Errors
     /// [`NoPlan`] if the scenario is not a valid mission, or if no positions give every hop an SIR above 0.
@@ -145,7 +146,7 @@ impl<'a> Carried<'a> {
 
     /// Returns `plan`, marked as proven if it is proven that no positions carry more data.
     ///
-    /// A plan in fitted slots, each as long as its hop needs, is never marked: there is no proof for it.
+    /// There is no proof for fitted time slots (as long as each hop needs).
     #[must_use]
     pub fn proven(&self, plan: Plan) -> Plan {
         let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
@@ -161,9 +162,10 @@ impl<'a> Carried<'a> {
         Plan { proven, ..plan }
     }
 
-    /// Returns the positions of the largest rate that Algorithm 1 finds, by bisection on the rate. For each rate it
-    /// uses the ratio of the SIRs that the two directions need. `least` is a rate that is known to be possible,
-    /// bit/s/Hz.
+    /// Returns the positions with the largest rate that Algorithm 1 finds, by bisection on the rate.
+    ///
+    /// For each rate it uses the ratio of the SIRs that the two directions need. `least` is a rate that is known to be
+    /// possible, bit/s/Hz.
     fn by_ratio(&self, briefed: &ProfiledMission, least: f64) -> Option<Vec<Placement>> {
         let reverse = self.scenario.reverse;
         let model = &self.radio.link.model;
@@ -201,8 +203,9 @@ impl<'a> Carried<'a> {
     }
 }
 
-/// Returns true if it is proven that no positions carry `bits_per_hz`, bit/s/Hz, over each hop to Rx. With `reverse`
-/// above 0 each hop must also carry `reverse` times that rate toward Tx.
+/// Returns true if it is proven that no positions carry `bits_per_hz`, bit/s/Hz, over each hop to Rx.
+///
+/// With `reverse` above 0 each hop must also carry `reverse` times that rate toward Tx.
 pub fn carries_no(scene: &Scene, radio: &Radio, reverse: f64, bits_per_hz: f64) -> bool {
     let model = &radio.link.model;
     let Some(there) = model.sinr(bits_per_hz) else {

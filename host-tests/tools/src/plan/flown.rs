@@ -1,7 +1,8 @@
-//! Positions on which relays with a scenario agree, and their loss against the best known ones.
+//! Positions that the relays agree on in flight, and their loss compared with the best known ones.
 //!
-//! On board there is a single interferer or a field. A hypothetical interferer in place of several is an approximation, and
-//! Algorithm 4 falls short in an uneven field, so the positions are judged against the full interference.
+//! In flight there is a single interferer or a field. A hypothetical interferer in place of several is an
+//! approximation, and Algorithm 4 is not optimal in an uneven field. The positions are therefore compared under the
+//! full interference.
 
 use std::path::{Path, PathBuf};
 
@@ -12,23 +13,26 @@ use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Sce
 use super::multi_interferer::with_one;
 use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, fitted_radio, merit, source};
 
-/// Result of the on-board method for a scenario: the positions on which the relays would agree.
+/// Positions that the relays would agree on in flight, and their loss.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
     /// Positions that the relays choose, with their SIRs against all interferers of the scenario.
     pub plan: Plan,
     /// Best SIR of the worst hop, linear, that the planner finds for this number of relays.
     pub best_sir: f64,
-    /// Data rate at the relays' positions, and the best rate found, both per bandwidth, bit/s/Hz. `None` unless the
-    /// slots are fitted (as long as each hop needs): then these rates decide, not the SIRs.
+    /// Data rates at the relays' positions and at the best ones found, both per bandwidth, bit/s/Hz.
+    ///
+    /// `None` unless the slots are fitted (as long as each hop needs). With fitted slots these rates decide, not the
+    /// SIRs.
     pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
 }
 
 impl Flown {
-    /// Returns the loss by the relays' positions, as a fraction of the best SIR. With fitted slots (as long as each hop
-    /// needs) it is a fraction of the best data rate.
+    /// Returns the loss at the relays' positions, as a fraction of the best SIR.
+    ///
+    /// With fitted slots (as long as each hop needs) it is a fraction of the best data rate.
     pub fn loss(&self) -> f64 {
         let [own, best] = self.rates.unwrap_or([self.plan.sir(), self.best_sir]);
         (1.0 - own / best).max(0.0)
@@ -39,7 +43,7 @@ impl Flown {
         self.loss() > LOSS
     }
 
-    /// Returns a line for the user: the loss by the relays' positions, its cause, and the remedy.
+    /// Returns a text for the user: the loss at the relays' positions, its cause, and the remedy.
     pub fn describe(&self) -> String {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
@@ -69,9 +73,9 @@ impl Flown {
     }
 }
 
-/// Returns the positions on which `relays` relays in `scenario` would agree by `method`.
+/// Returns the positions that `relays` relays in `scenario` would agree on by `method`.
 ///
-/// The cost is the cost of two calls of [`super::plan`].
+/// The cost is that of two calls of [`super::plan`].
 pub fn flown(
     scenario: &Scenario,
     relays: u16,
@@ -101,9 +105,9 @@ pub fn flown(
     })
 }
 
-/// Returns the plan with the positions that the relays would find on board by `method`.
+/// Returns the plan with the positions that the relays would find in flight by `method`.
 ///
-/// Relays use one hypothetical interferer in place of several, but the SIRs in the plan are against all of them.
+/// Relays use one hypothetical interferer in place of several. The SIRs in the plan are against all of them.
 pub(super) fn alone(
     scenario: &Scenario,
     relays: u16,
@@ -127,14 +131,14 @@ pub(super) fn alone(
     Ok(plan.against(&scene))
 }
 
-/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed plan.
+/// Largest difference of a coordinate between the file's plan and the recomputed plan, m.
 ///
-/// The two plans differ if the file's plan was made on another machine, which rounds differently.
+/// They differ if the file's plan was made on another machine, which rounds differently.
 const SAME_M: f64 = 0.1;
-/// Tolerated difference of the SIR, dB, between the file's plan and the recomputed plan.
+/// Largest difference of the SIR between the file's plan and the recomputed plan, dB.
 const SAME_DB: f64 = 0.01;
 
-/// Returns the section `[plan]` of a scenario file for the relays' agreed positions `flown`.
+/// Returns the section `[plan]` of a scenario file for the positions `flown`.
 pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned {
     let places: Vec<PlannedPlace> = flown
         .plan
@@ -155,9 +159,9 @@ pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned 
     }
 }
 
-/// Returns `value` as an f64 with few decimals, so that the file has short numbers.
+/// Returns the f64 with the shortest decimal form that rounds to `value` in f32.
 ///
-/// The result is the f64 with the shortest decimal form that rounds to `value` in f32.
+/// Files then have short numbers.
 pub(super) fn shortest(value: f32) -> f64 {
     format!("{value}").parse().unwrap_or_else(|_| value.into())
 }
@@ -229,7 +233,7 @@ pub fn with_altitudes(text: &str, plan: &Plan) -> Result<String, String> {
     Ok(file.to_string())
 }
 
-/// Returns the scenario file `text` with the elevation files `files`, as paths from the root folder.
+/// Returns the scenario file `text` with the elevation files `files`, as absolute paths.
 ///
 /// # Errors
 /// The reason if `text` is not valid TOML, or a file is missing.
@@ -249,7 +253,7 @@ pub fn with_files(text: &str, files: &[PathBuf]) -> Result<String, String> {
     Ok(file.to_string())
 }
 
-/// Keys of the sections of a scenario file whose paths are relative to the folder of the file.
+/// Sections and keys of a scenario file whose paths are relative to the folder of the file.
 const PATHS: [(&str, &[&str]); 3] = [
     ("network", &["key_file"]),
     (
@@ -284,12 +288,12 @@ const PATHS: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// Returns the scenario file `text` of `folder` for another folder.
+/// Returns the scenario file `text`, moved from `folder` to another folder.
 ///
-/// Its relative paths become paths from the root folder. Elevation files are left to [`with_files`].
+/// Its relative paths become absolute. [`with_files`] does this for elevation files.
 ///
 /// # Errors
-/// The reason if `text` is not valid TOML, or the current folder is unknown.
+/// The reason if `text` is not valid TOML, or if the current folder is unknown.
 pub fn moved(text: &str, folder: &Path) -> Result<String, String> {
     let mut file = document(text)?;
     let replace = |item: &mut Item| {
@@ -322,12 +326,12 @@ fn value(of: impl Into<Value>) -> Item {
     Item::Value(of.into())
 }
 
-/// Checks that the plan in the scenario file equals `flown`, on which the relays would agree.
+/// Checks that the plan in the scenario file equals `flown`, the positions of the relays in flight.
 ///
 /// `flown` must be computed for the same number of relays and method.
 ///
 /// # Errors
-/// A line that states the differences.
+/// A text that states the differences.
 pub fn is_current(planned: &Planned, flown: &Flown) -> Result<(), String> {
     let places = planned.places.iter().zip(&flown.plan.places);
     let off_m = places

@@ -1,8 +1,9 @@
 //! Location of an interferer in an area by the measurements of relays (`[listen]`).
 //!
-//! The error of the location is the Cramer-Rao bound. Relays at their positions before an estimate and at their planned positions
-//! measure ln I once each, with the relative error of `[listen]`, increased by the receiver's noise. Unknown are the power, x and the
-//! distance from the line or, if relays are beside the line, y. The time is that of simulated chains with drones.
+//! The error of the location is the Cramer-Rao bound. Each relay measures ln I once at each of its positions: those
+//! before an estimate, and the planned one. A measurement has the relative error of `[listen]`, increased by the
+//! receiver's noise. The unknowns are the power, x, and y; without its sign if all relays have y = 0. The time until
+//! the location is that of simulated chains with drones.
 
 use std::fmt;
 
@@ -21,16 +22,16 @@ use crate::listening::{RandomScene, quantile};
 
 /// Largest error of a located interferer, as a fraction of its distance from the line Tx-Rx.
 ///
-/// The interference at the nearest point of the line is then known within 0.9 dB.
+/// The interference at the nearest point of this line is then known within 0.9 dB.
 pub const LOCATED: f64 = 0.1;
 
 /// Number of positions of the interferer that are simulated.
 const SIMULATED: usize = 5;
 
-/// SIR of a chain that has located the interferer well, as a fraction of the best SIR: 1 dB less.
+/// Fraction of the best SIR that a chain must reach after the location: 1 dB less.
 const SHARE: f64 = 0.794;
 
-/// Longest time of a simulated search, s, in addition to the time of a flight from Tx to Rx at 10 m/s.
+/// Longest time of a simulated search, s, in addition to a flight from Tx to Rx at 10 m/s.
 const SEARCH_S: f64 = 180.0;
 
 /// Simulated search for the interferer at one position.
@@ -41,12 +42,12 @@ pub struct Search {
     /// Time from the start of the drones beside Tx to the first estimate, s; absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate_s: Option<f64>,
-    /// Time to positions with an SIR at most 1 dB below that with a known interferer, s.
+    /// Time until the chain's SIR is at most 1 dB below that with a known interferer, s.
     ///
     /// Absent if the relays do not reach such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placed_s: Option<f64>,
-    /// Distance of the last estimate from the interferer or its mirror image at the line, m.
+    /// Distance of the last estimate from the interferer, or from its mirror image at the line Tx-Rx, m.
     ///
     /// Absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,14 +62,14 @@ pub struct Search {
 pub struct Locating {
     /// Fraction of the area, 0 to 1, in which the relays can locate the interferer.
     ///
-    /// The error is then at most a tenth of the interferer's distance from the line.
+    /// The error is then at most a tenth of the interferer's distance from the line Tx-Rx.
     pub located: f64,
-    /// Median over the area of the standard deviation of the location, m; absent if it is infinite.
+    /// Median of the location's standard deviation over the area, m; absent if it is infinite.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_m: Option<f64>,
     /// Largest standard deviation of the location, m; absent if it is infinite.
     ///
-    /// It is infinite where the measurements do not determine the location.
+    /// It is infinite if the measurements do not determine the location.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_error_m: Option<f64>,
     /// Position [x, y] of the interferer with the largest error, m.
@@ -78,12 +79,12 @@ pub struct Locating {
 }
 
 impl Locating {
-    /// Sets the errors of `cells`, and creates the report of `plan`.
+    /// Creates the report of `plan`, and sets the errors in `cells`.
     ///
     /// `None` without `[listen]`, and unless there is a single interferer, with an area.
     ///
     /// # Errors
-    /// A line that says why the simulated relays do not fly.
+    /// A text that says why the flight cannot be simulated.
     pub fn new(
         scenario: &Scenario,
         plan: &Plan,
@@ -131,7 +132,7 @@ impl Locating {
     }
 }
 
-/// Returns an error of the location, m; `None` if it is infinite, because JSON has no infinite number.
+/// Returns `error_m`, or `None` if it is infinite: JSON has no infinite number.
 fn finite(error_m: f64) -> Option<f64> {
     error_m.is_finite().then_some(error_m)
 }
@@ -149,10 +150,10 @@ fn is_located(scenario: &Scenario, cell: &Cell) -> bool {
     cell.error_m.is_some_and(|error| error <= LOCATED * apart_m)
 }
 
-/// Returns the positions at which the relays measure: before an estimate, and in the plan.
+/// Returns the positions at which the relays measure: those before an estimate, and the planned ones.
 fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     let relays = plan.places.len() as f64;
-    // Hops of equal length; for one or two relays, then the first hop or the last hop half as long.
+    // Hops of equal length. For one or two relays also: the first hop half as long, and the last hop half as long.
     let spreads = if relays > 2.5 {
         &[[0.0, 0.0]][..]
     } else {
@@ -177,7 +178,9 @@ fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     places
 }
 
-/// Returns the Cramer-Rao bound of the location of the only source of `scene`: a standard deviation, m.
+/// Returns the Cramer-Rao bound for the location of the only source of `scene`, m.
+///
+/// It is a standard deviation.
 pub fn error_m(scene: &Scene, places: &[Place], relative_error: f64) -> f64 {
     let Some(source) = scene.sources.first() else {
         return f64::INFINITY;
@@ -202,7 +205,7 @@ pub fn error_m(scene: &Scene, places: &[Place], relative_error: f64) -> f64 {
     }
     let [[a, b, c], [_, d, e], [_, _, f]] = fisher;
     let determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d);
-    // Variances of x and y: the last two elements on the diagonal of the inverse.
+    // Variances of x and y: the last two diagonal elements of the inverse.
     let variance = ((a * f - c * c) + (a * d - b * b)) / determinant;
     if determinant > 1e-12 * a * d * f && variance >= 0.0 {
         unit_m * variance.sqrt()
@@ -211,7 +214,7 @@ pub fn error_m(scene: &Scene, places: &[Place], relative_error: f64) -> f64 {
     }
 }
 
-/// Simulates the search of drones that start beside Tx for an interferer in the middle of `cell`.
+/// Simulates drones that start beside Tx and search an interferer in the middle of `cell`.
 fn search(scenario: &Scenario, relays: u16, cell: &Cell) -> Result<Search, FigureError> {
     let mut scene = RandomScene {
         scenario: Scenario {
@@ -258,7 +261,7 @@ fn search(scenario: &Scenario, relays: u16, cell: &Cell) -> Result<Search, Figur
             found.estimate_s.get_or_insert(seconds);
             let [x, y] = [source.x_m, source.y_m].map(f64::from);
             found.off_m = Some((x - cell.at[0]).hypot(y.abs() - cell.at[1].abs()));
-            // The drones have arrived.
+            // All drones have arrived.
             if now.places.len() == usize::from(relays)
                 && truth.chain_sir(&now.places) >= SHARE * best
             {

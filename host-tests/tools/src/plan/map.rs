@@ -21,9 +21,9 @@ pub struct Feature {
     pub kind: &'static str,
     /// Coordinates of the object: one point, the two ends of a hop, or the points of a line.
     pub at: Vec<Geodetic>,
-    /// True for a line on the ground without heights of its own, for a globe that has a terrain.
+    /// True for a line on the ground without heights, for a globe that has its own terrain.
     pub is_clamped: bool,
-    /// Numbers of the object, such as its position and SIR. Each has a name that ends in the unit.
+    /// Numbers of the object, such as its position and SIR. The name of each ends in its unit.
     pub numbers: Vec<(&'static str, Number)>,
 }
 
@@ -32,7 +32,7 @@ pub struct Feature {
 pub enum Number {
     /// Count or index, shown exactly.
     Whole(u16),
-    /// Length in m, level in dB or the like, rounded to three decimals.
+    /// Length in m, level in dB and so on, rounded to three decimals.
     Rounded(f64),
     /// Ratio, for example a linear SIR, rounded to six decimals.
     Ratio(f64),
@@ -63,11 +63,11 @@ impl fmt::Display for Number {
 /// Geographic map of a plan, from which the GeoJSON and KML files are made.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Map {
-    /// Features of the map: Tx and Rx, relays and interferers, then the hops in order from Tx.
+    /// Objects on the map: Tx and Rx, relays and interferers, then the hops in order from Tx.
     pub features: Vec<Feature>,
     /// Height of the mean sea level above the ellipsoid, m, if the scenario states it.
     pub geoid_m: Option<f64>,
-    /// Numbers, from 1, of the interferers that are not on the map: they are too far from the line.
+    /// Numbers, from 1, of the interferers that are too far away for the map.
     pub left_out: Vec<usize>,
 }
 
@@ -75,7 +75,7 @@ impl Map {
     /// Creates the map of the chain in `plan`.
     ///
     /// # Errors
-    /// A line that names the missing part of the scenario.
+    /// A text that names the missing part of the scenario.
     pub fn new(scenario: &Scenario, plan: &Plan) -> Result<Self, String> {
         let line = scenario.line.as_ref().ok_or(
             "site: is missing; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }, which say where on earth the line is",
@@ -156,7 +156,7 @@ impl Map {
 
     /// Adds the state of each hop above the terrain, and the ground below it.
     ///
-    /// The map has the ground twice: with the heights of the elevation files, and clamped to the ground of the globe.
+    /// The ground is on the map twice: with the heights of the elevation files, and clamped to the ground of the globe.
     #[must_use]
     pub fn above(mut self, line: &Line, terrain: &TerrainReport) -> Self {
         let hops = self.features.iter_mut().filter(|one| one.kind == "hop");
@@ -209,7 +209,7 @@ impl Map {
     }
 }
 
-/// Largest number of points of a hop's ground on the map, approximately.
+/// Approximate largest number of ground points of a hop on the map.
 const MAP_POINTS: usize = 400;
 
 fn point(line: &Line, place: Placement) -> Option<Geodetic> {
@@ -293,8 +293,9 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
     }
 }
 
-/// Returns the points at which a hop crosses the antimeridian, at longitude 180 and -180 degrees. The hop takes the
-/// shorter way between its ends. `None` if it does not cross.
+/// Returns the points at which a hop crosses the antimeridian, at longitude 180 and -180 degrees.
+///
+/// The hop takes the shorter way between its ends. `None` if it does not cross.
 fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let [lon, lat, high] = from;
     let [other_lon, other_lat, other_high] = to;
@@ -302,7 +303,7 @@ fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
         return None;
     }
     let edge = if lon > 0.0 { 180.0 } else { -180.0 };
-    // Both longitudes relative to the side of the first point.
+    // Both longitudes are relative to the side of the first point.
     let share = (edge - lon) / (other_lon + 2.0 * edge - lon);
     let at = |from: f64, to: f64| from + share * (to - from);
     let (lat, high) = (at(lat, other_lat), at(high, other_high));
@@ -389,11 +390,11 @@ fn placemark(xml: &mut Xml, feature: &Feature) -> io::Result<()> {
         let shape = if at.len() > 1 { "LineString" } else { "Point" };
         xml.create_element(shape).write_inner_content(|xml| {
             if feature.is_clamped {
-                // A clamped line follows the ground between its points only if it is tessellated.
+                // Only a tessellated line follows the ground between its points.
                 leaf(xml, "tessellate", "1")?;
             }
             if shape == "Point" {
-                // Draws a line down to the ground.
+                // Draws a vertical line down to the ground.
                 leaf(xml, "extrude", "1")?;
             }
             let mode = if feature.is_clamped {

@@ -1,19 +1,19 @@
-//! Planner: number of relays for a target, or positions of a given number, without messages.
+//! Planner: number of relays for a target SIR, or positions of a given number of relays.
 //!
 //! | interference | file |
 //! | --- | --- |
 //! | one interferer | `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
 //! | one interferer, both directions | `one_both_ways`: closed forms for one relay; `source`: Algorithm 1, with a `bound` that proves it |
-//! | one interferer, data rates | `carried`: positions of the largest rate where they are not those of the largest SIR, by a shortest `path`; in fitted slots with rate `steps` by a search over exact reaches |
+//! | one interferer, data rates | `carried`: positions of the largest rate, if they are not those of the largest SIR, by a shortest `path`; for fitted slots and rate `steps` by a search over exact positions |
 //! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
 //! | a field, both directions | `source`: Algorithm 4 |
-//! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
+//! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum if the former is not good enough |
 //! | an interferer anywhere in an area, no-fly areas | `area`; `area_map`: the SIR for each position of the interferer; `locating`: its location by relays that measure it |
-//! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective; `terrain_flight`: altitudes with which relays fly over it by themselves |
+//! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the smallest loss by diffraction; `terrain_flight`: altitudes for relays that choose x by themselves |
 //! | several interferers, both directions | the same; a shortest `path` for the true sum, with a `bound` that proves it |
 //!
-//! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
-//! optimal.
+//! The planner sends no messages. It uses the crate's on-board code wherever there is a method. [`Plan::proven`] is
+//! true if the result is proven optimal.
 
 mod altitude;
 pub mod area;
@@ -49,7 +49,7 @@ pub use altitude::solved;
 /// It takes some milliseconds; with free altitudes up to some seconds for fifty relays or more.
 ///
 /// # Errors
-/// [`NoPlan`]: the request is invalid, or cannot be met. In the second case the error has the best SIR found.
+/// [`NoPlan`]: the request is invalid, or cannot be met. If it cannot be met, the error has the best SIR found.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() {
@@ -84,7 +84,7 @@ fn with_one_interferer(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, N
     }
 }
 
-/// Checks that the options of the request `ask` fit each other and the scenario.
+/// Checks that the options of `ask` fit each other and the scenario.
 fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     if ask.x_m.is_some() {
         only_one_way(scenario, "--x-m")?;
@@ -104,7 +104,7 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     Err(NoPlan::Wrong(wrong))
 }
 
-/// Returns an error that names the option `what`, if the scenario carries data in both directions.
+/// Returns an error that names the option `what` if the scenario has data in both directions.
 fn only_one_way(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
     if scenario.reverse > 0.0 {
         return Err(NoPlan::Wrong(format!(
@@ -115,10 +115,10 @@ fn only_one_way(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
     Ok(())
 }
 
-/// Number of relays that a plan shall have: given, or to be found for a target SIR.
+/// Number of relays of a plan: given, or to be found for a target SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Number {
-    /// Given number of relays, 1 to 1000. The plan has their best positions.
+    /// Number of relays, 1 to 1000. The plan has their best positions.
     Of(u16),
     /// Smallest number of relays that gives every hop this SIR, linear, above 0.
     Meeting(f64),
@@ -129,22 +129,23 @@ pub enum Number {
 pub struct PlanRequest {
     /// Number of relays, given or to be found for a target SIR.
     pub number: Number,
-    /// True if the planner may choose altitudes between the scenario's lowest and highest one.
+    /// True if the planner may choose altitudes between the scenario's lowest and highest altitude.
     pub free_altitude: bool,
-    /// Required x of the only relay, m, 0 to the distance of Tx and Rx. The planner then chooses its altitude.
+    /// Required x of the only relay, m, 0 to the distance Tx-Rx. The planner then chooses its altitude.
     pub x_m: Option<f64>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1.
     pub tolerance: f64,
 }
 
-/// Largest accepted loss of SIR, in comparison with the best positions, as a fraction of their SIR.
+/// Largest accepted loss of SIR compared with the best positions, as a fraction of their SIR.
 pub const LOSS: f64 = 0.01;
 
-/// Theorem, and its case, by which the position of a single relay was found.
+/// Theorem, and its case, that gave the position of a single relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Theorem {
-    /// Number of the theorem in the paper, 1 to 3; or 4 or 5, which are not in the paper. 4 is one relay beside the
-    /// line, and 5 is one relay for data in both directions.
+    /// Number of the theorem in the paper, 1 to 3; 4 and 5 are not in the paper.
+    ///
+    /// 4 is one relay with a lateral offset, and 5 one relay for data in both directions.
     pub number: u8,
     /// Number of the theorem's case in the paper; 0 for a case that the paper omits.
     pub case: u8,
@@ -155,27 +156,32 @@ pub struct Theorem {
 /// Result of planning with one hypothetical interferer in place of several.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fitted {
-    /// Hypothetical interferer: its power, its position and its error. The error is the difference between its
-    /// interference and that of all real interferers.
+    /// Hypothetical interferer: its power, position and error.
+    ///
+    /// The error is the difference between its interference and that of all real interferers.
     pub hypothetical: Hypothetical,
-    /// SIR, linear, against all interferers, at the best positions for the hypothetical interferer. `None` if no such
-    /// positions were found.
+    /// SIR against all interferers at the best positions for the hypothetical interferer, linear.
+    ///
+    /// `None` if no such positions were found.
     pub sir: Option<f64>,
-    /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
-    /// against all interferers.
+    /// True if the plan has the positions for the hypothetical interferer.
+    ///
+    /// False if it has the best positions found against all interferers.
     pub kept: bool,
-    /// Loss by the positions for the hypothetical interferer, as a fraction of the plan's SIR, 0 to 1. It is a loss of
-    /// data rate if each time slot is as long as its hop needs. `None` if no such positions were found.
+    /// Loss at the positions for the hypothetical interferer, as a fraction of the plan's SIR, 0 to 1.
+    ///
+    /// With fitted time slots it is the loss of data rate. `None` if no such positions were found.
     pub loss: Option<f64>,
-    /// True if the data rate decides which positions are better, because the time slots are fitted. A fitted slot is as
-    /// long as its hop needs.
+    /// True if the data rate decides which positions are better.
+    ///
+    /// This is so with fitted time slots, each as long as its hop needs.
     pub by_rate: bool,
 }
 
 /// Result of the planner: positions of the relays and SIRs of the hops.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Plan {
-    /// Mission for which the relays are planned.
+    /// Mission of the planned relays.
     pub mission: Mission,
     /// Positions and profiles (power, altitude) of the relays; relay 1, next to Tx, is first.
     pub places: Vec<(Placement, Profile)>,
@@ -187,10 +193,11 @@ pub struct Plan {
     pub how: &'static str,
     /// True if it is proven that no positions are better or no fewer relays suffice; false if unknown.
     pub proven: bool,
-    /// Theorem by which a single relay was placed; `None` if no theorem was used.
+    /// Theorem that gave the position of a single relay; `None` if no theorem was used.
     pub theorem: Option<Theorem>,
-    /// Best SIR, linear, that the plan's number of relays can have. `None` if unknown, or if the request has no
-    /// target SIR.
+    /// Best SIR that the plan's number of relays can have, linear.
+    ///
+    /// `None` if it is unknown, or if the request has no target SIR.
     pub most: Option<f64>,
     /// Result of planning with one hypothetical interferer; `None` unless there are several interferers.
     pub fitted: Option<Fitted>,
@@ -201,13 +208,13 @@ pub struct Plan {
 pub enum Why {
     /// Explanation for the user, one line.
     Plain(String),
-    /// Error: no number of relays gives every hop the target SIR.
+    /// No number of relays gives every hop the target SIR.
     Short {
         /// Requested SIR of every hop, linear.
         target: f64,
         /// Best SIR of the worst hop that was found, linear.
         most: f64,
-        /// Number of relays with the best SIR found; `None` if a number that was not tried might do better.
+        /// Number of relays with the best SIR found; `None` if an untried number might do better.
         relays: Option<u16>,
     },
 }
@@ -246,9 +253,9 @@ impl Default for Why {
 /// Error of the planner: there is no plan for the request.
 #[derive(Clone, PartialEq, Debug)]
 pub enum NoPlan {
-    /// Error: the scenario is not a valid mission, or the request does not fit it, for this reason.
+    /// The scenario is not a valid mission, or the request does not fit it, for this reason.
     Wrong(String),
-    /// Error: the request cannot be met, for this reason. The number is the best SIR found, linear.
+    /// The request cannot be met, for this reason. The number is the best SIR found, linear.
     Unmet(Why, Option<f64>),
 }
 
@@ -262,8 +269,10 @@ impl From<Refusal> for NoPlan {
 }
 
 impl Plan {
-    /// Returns the SIR of the worst hop, linear. In a plan for both directions an SIR toward Tx is first divided by
-    /// `reverse`, the fraction of the SIR toward Rx that suffices toward Tx.
+    /// Returns the SIR of the worst hop, linear.
+    ///
+    /// In a plan for both directions an SIR toward Tx is first divided by `reverse`, the required fraction of the SIR
+    /// toward Rx.
     pub fn sir(&self) -> f64 {
         let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
         self.back.map_or(there, |back| back.worst_both)
@@ -299,8 +308,9 @@ impl Plan {
     }
 }
 
-/// Returns the data link, with a bandwidth of 1 Hz, if the relays maximise the data rate. Their time slots are then
-/// fitted: as long as each hop needs. `None` if the relays maximise the SIR.
+/// Returns the data link, for a bandwidth of 1 Hz, if the relays maximise the data rate.
+///
+/// Their time slots are then fitted: as long as each hop needs. `None` if the relays maximise the SIR.
 fn fitted_radio(scenario: &Scenario, free_altitude: bool) -> Option<Radio> {
     let fits = free_altitude && scenario.has_fitted_slots();
     let link = scenario.link.clone().filter(|_| fits)?;
@@ -325,10 +335,10 @@ fn merit(radio: Option<&Radio>, scene: &Scene, places: &[impl Copy + Into<Place>
     radio.chain_bps(&there)
 }
 
-/// Returns the plan with the fewest relays whose SIR, by `sir`, is at least `target`. `plan` computes the plan of a number of
-/// relays.
+/// Returns the plan with the fewest relays whose SIR is at least `target`.
 ///
-/// It assumes that more relays do no worse.
+/// `plan` plans a number of relays, and `sir` returns the SIR of a plan. The search assumes that more relays do no
+/// worse.
 fn fewest_of<T>(
     target: f64,
     mut plan: impl FnMut(u16) -> Result<T, NoPlan>,
@@ -370,10 +380,10 @@ fn fewest_of<T>(
     Ok(found)
 }
 
-/// Largest number of relays that the planner tries when it searches the fewest relays for a target.
+/// Largest number of relays that the planner tries for a target.
 const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
-/// Mission with the relays' own profiles (power, altitude), and the indices of fixed-altitude relays.
+/// Mission, the relays' own profiles (power, altitude), and the indices of relays with fixed altitudes.
 struct ProfiledMission {
     mission: Mission,
     own: Vec<(u16, Profile)>,
@@ -404,7 +414,7 @@ impl ProfiledMission {
             .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
     }
 
-    /// Returns the plan with the relays at `places`. The library computes the SIRs of the plan for the mission.
+    /// Returns the plan with the relays at `places`, and the SIRs that they have in the mission.
     fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
         let held: Vec<(Placement, Profile)> = (1..)
             .zip(places)
@@ -431,10 +441,10 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the minimum separation of the relays does not cost any SIR, or if they have none.
+/// Returns true if the relays have no minimum separation, or if it costs no SIR.
 ///
-/// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR without the
-/// separation is not higher than with it, and `None` if it finds no chain.
+/// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR is then not
+/// higher, and `None` if it finds no chain.
 fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
     let free = Scenario {
         min_separation_m: 0.0,
@@ -462,7 +472,7 @@ impl Unit {
         }
     }
 
-    /// Formats a requested SIR, given as a linear ratio, in this unit without rounding it.
+    /// Formats a requested SIR, given as a linear ratio, in this unit, without rounding.
     pub fn asked(self, sir: f64) -> String {
         match self {
             Self::Linear => format!("{sir}"),

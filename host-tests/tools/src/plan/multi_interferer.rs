@@ -1,8 +1,9 @@
 //! Plans against several interferers.
 //!
-//! A hypothetical interferer replaces them, so that relays can find their positions by themselves. These positions are judged
-//! against the true sum; if they lose more than a hundredth to the best against that sum, the latter are used. For both directions
-//! the best are those of a shortest path. If relays with free altitudes fit their slots, the data rate decides instead of the SIR.
+//! A hypothetical interferer replaces them, so that relays can find their positions by themselves. If these positions
+//! lose more than 1 % against the true sum of the interferers, the best positions for that sum are used. For both
+//! directions these are found by a shortest path. For relays with free altitudes and fitted time slots, the data rate
+//! decides instead of the SIR.
 
 use uav_relay::Placement;
 
@@ -20,10 +21,10 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// Number of start chains that are improved by local search. These have the best SIRs.
+/// Number of start chains that local search improves: those with the best SIRs.
 const POLISHED: usize = 2;
 
-/// Largest number of interferers for which a start chain is computed. Each is then taken as the only interferer.
+/// Largest number of real interferers that each give a start chain, as the only interferer.
 const ALONE: usize = 4;
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
@@ -62,7 +63,7 @@ pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPla
 /// Returns the scenario with the hypothetical interferer in place of all others.
 pub(super) fn with_one(scenario: &Scenario, one: &Hypothetical) -> Scenario {
     let mut source = one.source();
-    // A mission's power limit; only the fit of interferers near that limit exceeds it.
+    // Power limit of a mission. Only the fit of interferers near this limit exceeds it.
     source.power_w = source.power_w.min(1e9);
     Scenario {
         interference: Interference::Sources(vec![source]),
@@ -80,8 +81,8 @@ struct Planner<'a> {
 
 /// Two candidate chains with the same number of relays.
 ///
-/// The first is the best chain for the hypothetical interferer, the second the best chain found against the sum of
-/// all real interferers.
+/// One is the best chain for the hypothetical interferer, the other the best chain found against the sum of all real
+/// interferers.
 struct Candidates {
     scene: Scene,
     relays: u16,
@@ -124,8 +125,9 @@ impl Planner<'_> {
         })
     }
 
-    /// Returns the best chain against the sum of all interferers; `None` if none is found. If altitudes are free or
-    /// differ, it improves several start chains by local search.
+    /// Returns the best chain found against the sum of all interferers; `None` if there is none.
+    ///
+    /// If altitudes are free or differ, local search improves several start chains.
     fn by_all(&self, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
         if let Some(x_m) = self.ask.x_m {
             return at(scene, x_m);
@@ -149,7 +151,7 @@ impl Planner<'_> {
             starts.extend(common.map(|chain| chain.into_iter().map(Place::from).collect()));
             starts.extend(self.of_variants(&scene));
         } else {
-            // Relays keep their different altitudes, right above the line.
+            // Relays keep their different altitudes, and have no lateral offset.
             (scene.band.left_m, scene.band.right_m) = (0.0, 0.0);
             for relay in &mut scene.relays {
                 relay.holds = true;
@@ -179,7 +181,7 @@ impl Planner<'_> {
         self.variants().iter().filter_map(best).collect()
     }
 
-    /// Returns the chain with the largest data rate that is found from several start chains.
+    /// Returns the chain with the largest data rate found from several start chains.
     fn by_rate(&self, radio: &Radio, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
         let mut starts = self.of_variants(scene);
         starts.extend(start.map(places));
@@ -193,11 +195,10 @@ impl Planner<'_> {
         best.max_by(|a, b| a.value.total_cmp(&b.value))
     }
 
-    /// Returns scenarios with a single interferer, whose best chains serve as further start chains.
+    /// Returns scenarios with a single interferer. Their best chains are further start chains.
     ///
-    /// They differ from the scenario of the hypothetical interferer: that interferer is on the other side of the
-    /// line, or relays may leave the line to one side only or not at all, or one of the first real interferers takes
-    /// its place.
+    /// They vary the scenario of the hypothetical interferer. This interferer is mirrored at the line Tx-Rx, or
+    /// replaced by one of the first real interferers; or relays may leave the line to one side only, or not at all.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();
@@ -230,8 +231,9 @@ impl Planner<'_> {
         variants
     }
 
-    /// Returns the plan with the fewest relays that give every hop the SIR `target`. The search assumes that more
-    /// relays do no worse.
+    /// Returns the plan with the fewest relays that give every hop the SIR `target`.
+    ///
+    /// The search assumes that more relays do no worse.
     fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
         let found = fewest_of(target, |relays| self.candidates(relays), Candidates::sir)?;
         found.chosen(self, Some(target))
@@ -247,8 +249,8 @@ impl Candidates {
 
     /// Returns the chain for the hypothetical interferer if it suffices, else the best chain found.
     ///
-    /// With a `target` the SIR suffices if it is at least `target`. Without one it suffices if it is at most 1 %
-    /// below the SIR of the best chain against all interferers.
+    /// With a `target` the SIR suffices if it is at least `target`. Without one it suffices if it is at most 1 % below
+    /// the SIR of the best chain against all interferers.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, value)| *value);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.value);
@@ -267,11 +269,11 @@ impl Candidates {
         let most = target.map(|_| self.sir());
         let is_best = self.by_all.as_ref().is_some_and(|best| best.proven);
         let is_fewest = match target {
-            // Different powers may do better with fewer relays: they are excluded one number after the other.
+            // With different powers fewer relays may do better, so each smaller number is excluded.
             Some(target) if self.scene.reverse > 0.0 => (1..self.relays)
                 .rev()
                 .all(|fewer| source::is_excluded_both_ways(planner.scenario, fewer, target)),
-            // With fewer relays not even the best chain meets the target.
+            // With fewer relays even the best chain misses the target.
             Some(_) => is_best,
             None => false,
         };
@@ -305,7 +307,7 @@ impl Candidates {
 }
 
 impl Best {
-    /// Creates the chain at `places`, rounded to the f32 numbers that relays use.
+    /// Creates the chain at `places`, rounded to f32 numbers as relays use them.
     fn new(
         radio: Option<&Radio>,
         scene: &Scene,
@@ -331,12 +333,12 @@ impl Best {
     }
 }
 
-/// Returns the best chain found for data in both directions, with the relays at their own altitudes.
+/// Returns the best chain found for data in both directions, with relays at their own altitudes.
 ///
-/// The search refines two chains, and returns the better result: the best chain on a grid of x, and the chain
-/// `start`. `None` if every SIR is 0.
+/// The search refines two chains and returns the better one: the best chain on a grid of x, and the chain `start`.
+/// `None` if every SIR is 0.
 fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best> {
-    // With so large a gap Shannon's rate is proportional to the SIR, and the best rate is that of the best SIR.
+    // With so large a gap Shannon's rate is proportional to the SIR, so the best rate has the best SIR.
     let link = Link {
         access: Access::Channels,
         bandwidth_hz: None,
@@ -366,15 +368,16 @@ fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best
     Some(Best { proven, ..best })
 }
 
-/// Widths of the first and the last moves that look for a larger rate, as fractions of the line.
+/// Widths of the first and the last moves for a larger rate, as fractions of the distance Tx-Rx.
 const MOVES: [f64; 2] = [1.0 / 16.0, 1e-5];
 /// Relative gain of a round of moves below which the width is halved.
 const GAIN: f64 = 1e-4;
-/// Rounding error allowed in a distance of two relays, as a fraction of the line.
+/// Rounding error allowed in the distance of two relays, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 2e-7;
 
-/// Returns the chain `start` after moves that raise its data rate. A move shifts one relay, all relays before it or
-/// all relays after it, along one coordinate.
+/// Returns the chain `start` after moves that raise its data rate.
+///
+/// A move shifts one relay, or all relays up to it, or all relays from it on, along one coordinate.
 fn faster(radio: &Radio, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
     let (d, band) = (scene.distance_m, scene.band);
     let moved = |at: Place, holds: bool, axis: usize, by: f64| match axis {
@@ -430,8 +433,9 @@ fn places(plan: &Plan) -> Vec<Place> {
     plan.chain().into_iter().map(Place::from).collect()
 }
 
-/// Returns the best altitude of a single relay at `x_m`, by a scan of the permitted altitudes. The scan is refined
-/// four times. `None` if every SIR is 0.
+/// Returns the best altitude of a single relay at `x_m`.
+///
+/// The permitted altitudes are scanned, and the scan is refined four times. `None` if every SIR is 0.
 fn at(scene: &Scene, x_m: f64) -> Option<Best> {
     const ROWS: u16 = 200;
     let band = scene.band;

@@ -1,14 +1,15 @@
-//! Closed forms of the best position of one relay for both directions, at its altitude above the line.
+//! Closed forms of the best x of one relay for both directions. The relay keeps its altitude, and y = 0.
 //!
-//! With l1 and l2 the squared lengths of the hops, s the relay's squared distance from the interferer, nu = N eta / P and constants
-//! a, b, c, e of the powers and of the interference at Tx and Rx, the SIRs that count are
+//! Let l1 and l2 be the squared lengths of the hops, s the relay's squared distance from the interferer, and nu = N eta
+//! / P. The constants a, b, c and e depend on the powers and on the interference at Tx and Rx. The SIRs are
 //!
 //! ```text
 //! F1 = a s / (l1 (1 + nu s))    F2 = b / l2    B1 / r = c / l1    B2 / r = e s / (l2 (1 + nu s))
 //! ```
 //!
-//! The largest minimum of these four smooth functions is at an end of the line, where one of them has a maximum, or where two are
-//! equal. Each of these conditions is a polynomial of degree 5 or less in x, of degree 3 or less without noise:
+//! The position with the largest minimum of these four functions is at Tx or Rx, where one of them has a maximum, or
+//! where two are equal. Each of these conditions is a polynomial of degree 5 or less in x, of degree 3 or less without
+//! noise:
 //!
 //! | condition | polynomial |
 //! | --- | --- |
@@ -26,10 +27,10 @@
 
 use uav_relay_scenario::scene::Scene;
 
-/// Best position of the only relay between Tx and Rx, for data in both directions.
+/// Best position of the only relay, for data in both directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Best {
-    /// Distance of the relay from Tx along the line to Rx, m.
+    /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
     /// Reason for the position: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
     pub case: u8,
@@ -37,7 +38,7 @@ pub struct Best {
     pub words: String,
 }
 
-/// Names of the four hop SIRs, for the user: first the two hops to Rx, then the two hops back to Tx.
+/// Names of the four SIRs for the user: of the two hops to Rx, then of the two hops back to Tx.
 const NAMES: [&str; 4] = [
     "the first hop",
     "the second hop",
@@ -45,7 +46,7 @@ const NAMES: [&str; 4] = [
     "the second hop on the way back",
 ];
 
-/// Largest relative difference of two hops' SIRs that count as equal in the explanation.
+/// Largest relative difference of two SIRs that count as equal in the explanation.
 const EQUAL: f64 = 1e-6;
 
 /// Coefficients of a polynomial, from the constant term to the highest power.
@@ -53,7 +54,7 @@ type Polynomial = Vec<f64>;
 
 /// Returns the best position of a single relay for both directions; `None` if every SIR is 0.
 ///
-/// The SIR from Rx to Tx needs to be only `reverse` (above 0) times the SIR from Tx to Rx.
+/// The SIR toward Tx needs to be only `reverse` (above 0) times the SIR toward Rx.
 pub fn best(scene: &Scene, reverse: f64) -> Option<Best> {
     let ([relay], [source]) = (scene.relays.as_slice(), scene.sources.as_slice()) else {
         return None;
@@ -171,8 +172,9 @@ fn slope(of: &[f64]) -> Polynomial {
         .collect()
 }
 
-/// Returns the real roots of the polynomial `of` within 0 to `end`. The roots are located between the roots of the
-/// derivative.
+/// Returns the real roots of the polynomial `of` within 0 to `end`.
+///
+/// They are searched between the roots of the derivative.
 fn roots(of: &[f64], end: f64) -> Vec<f64> {
     let size = of.iter().rposition(|coefficient| *coefficient != 0.0);
     let Some(of) = size.and_then(|degree| of.get(..=degree)) else {
@@ -189,7 +191,7 @@ fn roots(of: &[f64], end: f64) -> Vec<f64> {
     for pair in edges.windows(2) {
         let &[mut low, mut high] = pair else { continue };
         let rises = value(of, high) > value(of, low);
-        // A double root has no change of sign: its turn is a candidate.
+        // At a double root the sign does not change. The extremum itself is then a candidate.
         found.push(high);
         if value(of, low) * value(of, high) > 0.0 {
             continue;

@@ -1,14 +1,15 @@
-//! Positions with the terrain in the objective.
+//! Positions with the smallest loss by terrain.
 //!
-//! The SIR of a hop is that of free space, times the gain of diffraction.
+//! The SIR of a hop is that of free space, times the gain of diffraction (0 to 1).
 //!
-//! The best chain on a grid over x and the altitude is found by dynamic programming: the best worst hop of a chain that ends with relay k
-//! at a grid point is the largest, over the points of relay k - 1, of the smaller of that relay's value and the SIR of the hop. On
-//! its grid the result is exact. Chains without a blocked hop come first, because others are refused. The result is refined by the same
-//! method on finer grids around the relays. The relays are on the line, y = 0.
+//! The best chain on a grid over x and altitude is found by dynamic programming. Each grid point of relay k has the
+//! best chain that ends there. This chain extends the best chain to a grid point of relay k - 1 by a hop; its value is
+//! the smaller of that chain's value and the SIR of the hop. On its grid the result is exact. Chains without a blocked
+//! hop come first, because others are refused. The result is refined by the same method on finer grids around the
+//! relays. All relays have y = 0.
 //!
-//! Candidates of the previous relay are visited in the order of a bound without diffraction, so that few losses are computed. Hops below
-//! the SIR of a chain on a coarser grid are left out.
+//! Grid points of the previous relay are tried in the order of an upper bound without diffraction, so that few losses
+//! are computed. Hops below the SIR of a chain from a coarser grid are left out.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -24,42 +25,44 @@ use uav_relay_terrain::profile::{Ground, Node, bulge_m};
 use super::terrain::Elevation;
 use super::{NoPlan, Number, Plan, PlanRequest, Why, area};
 
-/// Largest number of relays for which positions over terrain are searched.
+/// Largest number of relays in a search over terrain.
 pub const MOST_RELAYS: u16 = 50;
 
 /// Number of altitudes of the first grid at each x.
 const LEVELS: u32 = 12;
 
-/// Largest number of terrain points along the whole line during the search. A hop has its share of them.
+/// Largest number of terrain points along the whole line Tx-Rx during the search.
 const POINTS: f64 = 800.0;
 
-/// Number of points of a profile at the end of the search: all, as in reports.
+/// Number of points of a profile at the end of the search: all of them, as in reports.
 pub(super) const FINE_POINTS: f64 = f64::INFINITY;
 
-/// Smallest width of a grid's columns, m, with which the highest ground of each column is tried, too.
+/// Smallest distance between columns of the grid, m, at which hilltops between them are tried, too.
 const WIDE_M: f64 = 100.0;
 
 /// Number of finer grids, each with cells half as large.
 const REFINEMENTS: i32 = 5;
 
-/// Factor on the gain of a hop that the terrain blocks. The factor is so small that every chain with a blocked hop ranks behind all chains
-/// without one.
+/// Factor on the gain of a blocked hop. Every chain with a blocked hop then ranks behind all others.
 const BLOCKED: f64 = 1e-30;
 
-/// Grid points on each side of a relay in a finer grid.
+/// Number of grid points on each side of a relay in a finer grid.
 const AROUND: i32 = 2;
 
 /// Comparison of the positions for the terrain with the positions that ignore the terrain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OverTerrain {
-    /// SIR of the worst hop with terrain, dB, at the positions that ignore the terrain. Absent without such positions.
+    /// SIR of the worst hop with terrain at the positions that ignore the terrain, dB.
+    ///
+    /// Absent without such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
     /// Gain of the plan compared with the positions that ignore the terrain, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_gain_db: Option<f64>,
-    /// Reason why the positions that ignore the terrain cannot be flown, or do not exist. Absent if they can be
-    /// flown.
+    /// Reason why the positions that ignore the terrain cannot be flown, or do not exist.
+    ///
+    /// Absent if they can be flown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_problem: Option<String>,
 }
@@ -85,7 +88,7 @@ impl fmt::Display for OverTerrain {
 pub struct Candidate {
     /// Distance from Tx, m.
     pub x_m: f64,
-    /// Altitude above the straight line between the sites, m.
+    /// Altitude above the straight line from the ground at Tx to the ground at Rx, m.
     pub h_m: f64,
     amsl_m: f64,
 }
@@ -96,26 +99,26 @@ pub struct Search<'a> {
     scene: &'a Scene,
     ground: Ground<'a>,
     wavelength_m: f64,
-    /// Ground along the line: x and height, m.
+    /// Ground along the line Tx-Rx: x and height, m.
     line: Vec<Point>,
-    /// True if the points of the line are only the highest ones of equal steps.
+    /// True if `line` has only the highest points of equal steps.
     is_coarse: bool,
-    /// Least and greatest height above the ground, and the position error, m.
+    /// Least and greatest height above the ground, m.
     clearance_m: [f64; 2],
     position_error_m: f64,
-    /// True if the scenario's band of altitudes limits the altitudes in addition to `clearance_m`.
+    /// True if the scenario's range of altitudes limits the altitudes, too.
     is_banded: bool,
     losses: HashMap<[[u64; 2]; 2], f64>,
     no_fly: Vec<NoFly>,
 }
 
 impl<'a> Search<'a> {
-    /// Creates a search above the line of the scenario, with at most 800 points of a profile.
+    /// Creates a search along the line Tx-Rx of the scenario, with at most 800 points of the terrain.
     ///
-    /// If the line has more terrain cells, each point has the height of the highest ground near it.
+    /// If the terrain has more points, each point has the height of the highest ground near it.
     ///
     /// # Errors
-    /// A line that names the position: the elevation files do not cover it, or have no height there.
+    /// A text that names the position: the elevation files do not cover it, or have no height there.
     pub fn new(
         scenario: &Scenario,
         scene: &'a Scene,
@@ -124,7 +127,7 @@ impl<'a> Search<'a> {
         Self::with_points(scenario, scene, elevation, POINTS)
     }
 
-    /// Creates a search with at most `points` points of a profile.
+    /// Creates a search with at most `points` points of the terrain.
     pub(super) fn with_points(
         scenario: &Scenario,
         scene: &'a Scene,
@@ -154,8 +157,9 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the error message for a search without positions. It contains the permitted heights with the scenario keys that set them,
-    /// and the lowest ground.
+    /// Returns the error message for a search that finds no positions.
+    ///
+    /// It contains the permitted heights, the scenario keys that set them, and the lowest ground.
     fn nowhere(&self, scenario: &Scenario) -> String {
         let [least_m, most_m] = self.clearance_m;
         let relays = self.scene.relays.len();
@@ -206,8 +210,9 @@ impl<'a> Search<'a> {
         Ok(f64::from(self.ground.point(x_m, 0.0)?.amsl_mm) / 1e3)
     }
 
-    /// Returns the candidate positions of relay `relay` (from 0) at `x_m`. `levels` returns the altitudes to try,
-    /// from the lowest and highest permitted altitude.
+    /// Returns the candidate positions of relay `relay` (from 0) at `x_m`.
+    ///
+    /// `levels` returns the altitudes to try, for the lowest and highest permitted altitude.
     fn column(
         &self,
         relay: usize,
@@ -240,7 +245,7 @@ impl<'a> Search<'a> {
     /// Returns the candidate positions of every relay on a grid of `columns` x by `levels` altitudes.
     ///
     /// # Errors
-    /// A line that names the position: the elevation files do not cover it, or have no height there.
+    /// A text that names the position: the elevation files do not cover it, or have no height there.
     pub fn grid(&self, columns: u32, levels: u32) -> Result<Vec<Vec<Candidate>>, String> {
         let relays = 0..self.scene.relays.len();
         let each = relays.map(|relay| {
@@ -252,9 +257,10 @@ impl<'a> Search<'a> {
         each.collect()
     }
 
-    /// Returns the candidate positions of relay `relay` (from 0) at `x_m`. There are `levels` altitudes in equal
-    /// steps over the permitted range. Candidates in a no-fly area are left out. A relay with a fixed altitude has at
-    /// most one candidate.
+    /// Returns the candidate positions of relay `relay` (from 0) at `x_m`.
+    ///
+    /// They are at `levels` altitudes in equal steps over the permitted range. Candidates in a no-fly area are left
+    /// out. A relay with a fixed altitude has at most one candidate.
     pub(super) fn above(
         &self,
         relay: usize,
@@ -268,15 +274,15 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the position at `x_m` and the altitude `h_m`, allowed or not.
+    /// Returns the position at `x_m` and the altitude `h_m`, whether it is permitted or not.
     pub(super) fn candidate(&self, x_m: f64, h_m: f64) -> Result<Candidate, String> {
         let amsl_m = self.datum_m(x_m)? + h_m;
         Ok(Candidate { x_m, h_m, amsl_m })
     }
 
-    /// Returns the SIR of a chain's worst hop, linear; much less if an altitude is not permitted.
+    /// Returns the SIR of a chain's worst hop, linear; much less if a position is not permitted.
     ///
-    /// Every chain with such an altitude ranks behind all chains without one.
+    /// Every chain with such a position ranks behind all chains without one.
     pub(super) fn rank(&mut self, chain: &[Candidate]) -> Result<f64, String> {
         let mut off_m: f64 = 0.0;
         for at in chain {
@@ -299,9 +305,9 @@ impl<'a> Search<'a> {
         Ok(factor * self.worst_sir(chain))
     }
 
-    /// Returns the candidates on the highest ground of each of `columns` columns; none in narrow columns.
+    /// Returns candidates at the highest point of each column of the grid; none in narrow columns.
     ///
-    /// A hilltop between two columns of the grid is then a position, too. Columns are narrow below [`WIDE_M`].
+    /// Hilltops between two columns of the grid are then candidates, too. Columns are narrow below [`WIDE_M`].
     fn crests(&self, relay: usize, columns: u32, levels: u32) -> Result<Vec<Candidate>, String> {
         let wide_m = self.scene.distance_m / f64::from(columns + 1);
         if wide_m < WIDE_M {
@@ -322,8 +328,9 @@ impl<'a> Search<'a> {
         Ok(crests.collect::<Result<Vec<_>, String>>()?.concat())
     }
 
-    /// Returns the candidate positions around each relay of `chain`. The steps are `step_m` along x and `climb_m` in
-    /// altitude.
+    /// Returns the candidate positions around each relay of `chain`.
+    ///
+    /// The steps are `step_m` along x and `climb_m` in altitude.
     fn around(
         &self,
         chain: &[Candidate],
@@ -337,7 +344,7 @@ impl<'a> Search<'a> {
                 if !(x_m > 0.0 && x_m < self.scene.distance_m) {
                     continue;
                 }
-                // The lowest altitude is often the best one, and is between two steps.
+                // The lowest altitude is often the best, but seldom a multiple of the step.
                 let levels = |[low, high]: [f64; 2]| {
                     steps()
                         .map(|step| (at.h_m + step * climb_m).clamp(low, high))
@@ -352,7 +359,7 @@ impl<'a> Search<'a> {
 
     /// Returns the SIR of the hop to node `node` in free space, linear.
     ///
-    /// If the mission has both directions, this is the smaller SIR of the two.
+    /// For both directions it is the smaller SIR of the two, with the SIR toward Tx divided by `reverse`.
     fn free_sir(&self, node: usize, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let place = |at: Candidate| (at.x_m, at.h_m);
         let relays = &self.scene.relays;
@@ -390,7 +397,7 @@ impl<'a> Search<'a> {
         there
     }
 
-    /// Returns the gain of the hop by diffraction, 0 to 1, times [`BLOCKED`] if the terrain blocks the hop.
+    /// Returns the gain of a hop by diffraction, 0 to 1, times [`BLOCKED`] if the terrain blocks the hop.
     fn gain(&mut self, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let [tx, rx] = self.ground.ends;
         let end = |node: Node| Candidate {
@@ -416,7 +423,7 @@ impl<'a> Search<'a> {
         gain
     }
 
-    /// Returns the ground between two positions on the line.
+    /// Returns the ground between two x on the line Tx-Rx.
     fn profile(&self, from_m: f64, to_m: f64) -> Vec<Point> {
         let after = |x_m: f64| self.line.partition_point(|[x, _]| *x <= x_m);
         let height = |x_m: f64| {
@@ -455,13 +462,13 @@ impl<'a> Search<'a> {
 
     /// Returns the best chain of the candidates, and the SIR of its worst hop, linear.
     ///
-    /// `None` if no chain has at least the SIR `floor`. A high floor saves time: hops below it are left out.
+    /// `None` if no chain has at least the SIR `floor`. Hops below it are left out, so that a high floor saves time.
     pub fn best(
         &mut self,
         candidates: &[Vec<Candidate>],
         floor: f64,
     ) -> Option<(Vec<Candidate>, f64)> {
-        // For each candidate of a relay: the worst hop up to it, and the candidate of the relay before it.
+        // For each candidate of a relay: the SIR of the worst hop so far, and the index of the previous candidate.
         let mut layers: Vec<Vec<(f64, usize)>> = Vec::new();
         for (node, own) in candidates.iter().enumerate() {
             let before = node
@@ -505,7 +512,7 @@ impl<'a> Search<'a> {
         Some((chain, sir))
     }
 
-    /// Returns the largest worst-hop SIR of the chains from Tx to `to`, and its place before `to`. The place is an index in `before`.
+    /// Returns the SIR of the best chain from Tx to `to`, and the index of its last candidate in `before`.
     fn reached(
         &mut self,
         node: usize,
@@ -541,9 +548,9 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns points at equal steps of at least `step_m`, each with the highest of the points near it.
+/// Returns points at equal steps of about `step_m`, each with the highest of the points near it.
 ///
-/// The ground at the ends is that of `fine`, below the antennas.
+/// The first and the last point are those of `fine`, because they are below the antennas.
 fn coarse(fine: &[Point], step_m: f64) -> Vec<Point> {
     let near = |[x_m, _]: &Point| (x_m / step_m).round();
     let chunks = fine.chunk_by(|one, other| near(one).total_cmp(&near(other)).is_eq());
@@ -562,11 +569,10 @@ fn coarse(fine: &[Point], step_m: f64) -> Vec<Point> {
     line
 }
 
-/// Returns the best positions of `relays` relays over the terrain, on the line.
+/// Returns the best positions over the terrain for `relays` relays with y = 0.
 ///
 /// # Errors
-/// [`NoPlan`]: an interference or a number of relays for which there is no search, terrain that is not covered, or no positions
-/// that are high enough.
+/// [`NoPlan`]: too many relays, a field of interference, terrain that is not covered, or no permitted positions.
 pub fn best(
     scenario: &Scenario,
     elevation: &Elevation,
@@ -585,7 +591,7 @@ pub fn best(
     let briefed = area::profiles(scenario, relays, tolerance)?;
     let mut search = Search::new(scenario, &scene, elevation).map_err(NoPlan::Wrong)?;
     let columns = u32::from(relays * 8).max(80);
-    // The positions that ignore the terrain, as high as they have to be, are candidates: the search does no worse.
+    // The positions that ignore the terrain are candidates, raised if necessary, so that the search does no worse.
     let mut seeds = vec![Vec::new(); usize::from(relays)];
     let ask = PlanRequest {
         number: Number::Of(relays),
@@ -602,7 +608,7 @@ pub fn best(
                 .map_err(NoPlan::Wrong)?;
         }
     }
-    // A coarse grid first: its best chain is a candidate of the grid, and the grid's floor.
+    // The best chain of a coarse grid is a candidate of the fine grid, and its SIR is the floor.
     let mut found: Option<(Vec<Candidate>, f64)> = None;
     let mut highest: f64 = 0.0;
     for (columns, levels) in [(columns / 4, LEVELS / 4), (columns, LEVELS)] {
@@ -646,8 +652,9 @@ pub fn best(
 }
 
 impl Candidate {
-    /// Returns the position with the numbers that relays use. The altitude is rounded up, so that it stays above the
-    /// ground.
+    /// Returns the position with the f32 numbers that relays use.
+    ///
+    /// The altitude is rounded up, so that it stays above the ground.
     #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
     pub fn placement(&self) -> Placement {
         let altitude_m = self.h_m as f32;

@@ -1,40 +1,41 @@
-//! Positions along the line with the largest data rate: a shortest path.
+//! Positions on the line Tx-Rx with the largest data rate, as a shortest path.
 //!
-//! In fitted slots a bit of data takes the time of all hops, and a chain that is planned for both directions carries r bits back for
-//! each bit to Rx. In equal slots, and with a frequency for each hop, the worst hop counts. In units of 1 / bandwidth
+//! In fitted slots one bit takes the sum of the times of all hops. A chain for both directions carries r bits back for
+//! each bit to Rx. In equal slots, and with a frequency for each hop, only the worst hop counts. The time for one bit,
+//! in units of 1 / bandwidth, is
 //!
 //! ```text
 //! fitted             sum over hops of  1 / b(F) + r / b(B)
 //! slots, channels    max over hops of  max(1 / b(F), r / b(B))
 //! ```
 //!
-//! is the smallest. Each term depends on the positions of two neighbours only, so the best positions on a grid are found by dynamic
-//! programming over the relays, one table for all numbers of relays ([`Table`]). Then the same is repeated in windows about the
-//! positions found, which become narrower (`refined`). The grid has dense points near Tx, Rx and the interferers, where the best
-//! positions for rates gather.
+//! The search minimises this time. Each term depends only on the positions of two neighbours, so the best positions on
+//! a grid are found by dynamic programming. One [`Table`] has the results for all numbers of relays. The search is then
+//! repeated in ever narrower windows around the positions found (`refined`). The grid is dense near Tx, Rx and the
+//! interferers, because the best positions are often there.
 //!
-//! Steps of a radio make the times constant between thresholds. So that ties are decided toward the next threshold, the search adds a
-//! small share of a time that falls everywhere (`Times::guide`). The result is compared by the true times.
+//! With the rate steps of a radio, times are constant between two thresholds. The search adds a very small time that
+//! falls with the SIR (`Times::guide`), so that of equal times the one closer to the next threshold is better. Results
+//! are compared by the true times.
 
 use uav_relay_scenario::link::{Access, Radio, RateModel};
 use uav_relay_scenario::number::{factor, narrow};
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Number of equal intervals of the grid of x on which the search begins.
+/// Number of equal intervals of the first grid of x.
 ///
-/// If the minimum separation of the relays exceeds half of this spacing, the spacing is the separation or a fraction of
-/// it.
+/// If the minimum separation exceeds half of this spacing, the spacing is the separation or a whole fraction of it.
 const EVEN: f64 = 700.0;
 
-/// Largest number of equally spaced points in the grid of x on which the search begins.
+/// Largest number of equally spaced points in the first grid of x.
 const MOST_EVEN: u32 = 1_402;
 
 /// Number of dense grid points on each side of Tx, Rx and every interferer.
 const DENSE: i32 = 22;
-/// Ratio by which each dense grid point is farther from Tx, Rx or an interferer than the point before.
+/// Ratio of the distances of two successive dense grid points from Tx, Rx or an interferer.
 const RATIO: f64 = 1.4;
 
-/// Distance of the nearest dense grid point from Tx, Rx or an interferer, relative to the line Tx-Rx.
+/// Distance of the nearest dense grid point from Tx, Rx or an interferer, relative to Tx-Rx.
 const NEAREST: f64 = 1e-4;
 
 /// Number of grid points in the window around a relay's position; odd, to include the position.
@@ -43,20 +44,20 @@ const WINDOW: i32 = 9;
 /// Largest number of searches in windows around the relays' positions.
 const MOST_WINDOWS: u32 = 260;
 
-/// Distance from a relay to the edges of its first search window, as a fraction of the line Tx-Rx.
+/// Distance from a relay to the edges of its first search window, as a fraction of the distance Tx-Rx.
 const WIDEST: f64 = 0.02;
-/// Distance from a relay to its window's edges at which the refinement ends, as a fraction of the line.
+/// Distance from a relay to its window's edges at which the search ends, relative to Tx-Rx.
 const NARROWEST: f64 = 1e-7;
 
-/// Rounding error allowed in a distance of two positions, as a fraction of the line Tx-Rx.
+/// Rounding error allowed in the distance of two positions, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 1.2e-7;
 
-/// Weight of a small extra time that decides between hops of equal time in favour of the higher SIR.
+/// Weight of a very small extra time: of equal times, the one with the higher SIR is then better.
 ///
 /// Hops at the same rate step of a radio have equal times.
 const GUIDE: f64 = 1e-3;
 
-/// Calculator of the time that each hop of a chain needs for one bit of data to Rx.
+/// Times that the hops of a chain need for one bit of data to Rx.
 ///
 /// The unit is s Hz: the time in s for a bandwidth of 1 Hz.
 #[derive(Clone, Debug)]
@@ -64,7 +65,7 @@ pub struct Times<'a> {
     pub(super) scene: &'a Scene,
     radio: &'a Radio,
     pub(super) reverse: f64,
-    /// Rate steps of the radio: each with its least SINR, linear, and its bit/s/Hz. Empty for Shannon's formula.
+    /// Rate steps of the radio: least SINR, linear, and bit/s/Hz of each. Empty for Shannon's formula.
     pub(super) steps: Vec<(f64, f64)>,
 }
 
@@ -76,8 +77,9 @@ pub(super) struct Point {
 }
 
 impl<'a> Times<'a> {
-    /// Creates the calculator for a chain. `reverse` is the required rate to Tx, as a fraction of the rate to Rx; 0
-    /// for one direction.
+    /// Creates the times of a chain.
+    ///
+    /// `reverse` is the required rate to Tx, as a fraction of the rate to Rx; 0 for one direction.
     pub fn new(scene: &'a Scene, radio: &'a Radio, reverse: f64) -> Self {
         let steps = match &radio.link.model {
             RateModel::Shannon { .. } => Vec::new(),
@@ -109,7 +111,9 @@ impl<'a> Times<'a> {
         self.scene.relays.get(node.checked_sub(1)?)
     }
 
-    /// Returns the position `x`, m, of `node` with its interference plus noise. Node 0 is Tx; a number above N is Rx.
+    /// Returns the position `x`, m, and the interference plus noise there.
+    ///
+    /// `node` is 0 for Tx, and above N for Rx.
     pub(super) fn point(&self, node: usize, x: f64) -> Point {
         let interference_w = match self.relay(node) {
             Some(relay) => self.scene.interference_w((x, relay.altitude_m)),
@@ -129,7 +133,7 @@ impl<'a> Times<'a> {
         self.point(usize::MAX, self.scene.distance_m)
     }
 
-    /// Returns the hop from relay `from` to relay `to`, counted from 1. `None` stands for Tx or Rx.
+    /// Returns the hop from relay `from` to relay `to`, counted from 1; `None` is Tx or Rx.
     pub(super) fn hop(&self, from: Option<usize>, to: Option<usize>) -> Hop {
         let [low, high] = [from, to].map(|node| node.and_then(|node| self.relay(node)));
         let climb =
@@ -156,8 +160,10 @@ impl<'a> Times<'a> {
         }
     }
 
-    /// Returns the time of a hop for one bit, s Hz; infinite if the hop carries nothing or is too short. With `guide`
-    /// a radio's rate steps get a small extra time that falls as the SIR rises, to decide between equal times.
+    /// Returns the time of a hop for one bit, s Hz; infinite if the hop carries nothing or is too short.
+    ///
+    /// With `guide` a radio's rate steps get a very small extra time that falls as the SIR rises, so that times are not
+    /// equal.
     pub(super) fn time(&self, hop: &Hop, from: Point, to: Point, guide: bool) -> f64 {
         let apart = to.x - from.x;
         if apart < hop.least_m - ROUNDING * self.scene.distance_m || apart < 0.0 {
@@ -166,8 +172,9 @@ impl<'a> Times<'a> {
         self.time_at(hop, apart, [from.disturbance_w, to.disturbance_w], guide)
     }
 
-    /// Returns the time of a hop for one bit, s Hz, as [`Times::time`] does. `apart` is its length along x, m, and
-    /// `disturbances_w` are the interference plus noise at its two nodes.
+    /// Returns the time of a hop for one bit, s Hz, as [`Times::time`] does.
+    ///
+    /// `apart` is its length along x, m. `disturbances_w` are interference plus noise at its two nodes, W.
     pub(super) fn time_at(
         &self,
         hop: &Hop,
@@ -197,16 +204,18 @@ impl<'a> Times<'a> {
         if guide { time + Self::guide(sir) } else { time }
     }
 
-    /// Returns a very small time that falls as the SIR rises, s Hz. It is added to the time for one bit, so that of
-    /// two chains with equal times the chain with the higher SIR is better.
+    /// Returns a very small time that falls as the SIR rises, s Hz.
+    ///
+    /// It is added to the time for one bit. Of two chains with equal times, the chain with the higher SIR is then
+    /// better.
     fn guide(sir: f64) -> f64 {
         GUIDE / libm::log1p(sir)
     }
 
     /// Returns the time of a chain for one bit, s Hz, with the relays at `x`, m.
     ///
-    /// It is infinite if the chain carries nothing, or if relays are closer than the minimum separation. Rounding of
-    /// the positions is allowed for.
+    /// It is infinite if the chain carries nothing, or if relays are closer than the minimum separation, apart from
+    /// rounding.
     pub fn total(&self, x: &[f64]) -> f64 {
         self.along(x, false)
     }
@@ -224,10 +233,10 @@ impl<'a> Times<'a> {
         self.add(total, self.time(&last, from, self.rx(), guide))
     }
 
-    /// Returns the grid of x, m, on which the search begins, ascending. It is denser near Tx, Rx and the interferers.
+    /// Returns the first grid of x, m, ascending. It is denser near Tx, Rx and the interferers.
     fn grid(&self) -> Vec<f64> {
         let d = self.scene.distance_m;
-        // Relays that gather keep exactly their minimum separation: it is a whole number of steps.
+        // The best distance between relays is often exactly the minimum separation, so it is a whole number of steps.
         let apart = self.scene.min_separation_m;
         let parts = (apart * EVEN / d).ceil();
         let step = if apart * EVEN > 0.5 * d {
@@ -252,14 +261,14 @@ impl<'a> Times<'a> {
         points
     }
 
-    /// Improves the positions `start` by repeated search in a window around each relay.
+    /// Improves the positions `start` by repeated searches in windows around all relays.
     ///
     /// The windows shrink when they no longer help. Returns the time of the best chain, s Hz, and its positions.
     pub fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let d = self.scene.distance_m;
         let mut x = start.to_vec();
         let mut time = self.along(&x, true);
-        // The relays' positions are f32, and a step of a radio may depend on the last digit.
+        // The relays' positions are f32, and the rate step of a hop may depend on the last digit.
         let rounded = |x: &[f64]| -> Vec<f64> { x.iter().map(|x| narrow(*x).into()).collect() };
         let first = rounded(&x);
         let mut best = (self.total(&first), first);
@@ -303,15 +312,15 @@ impl<'a> Times<'a> {
     }
 }
 
-/// Constants of a hop that do not depend on the x of its two nodes.
+/// Constants of a hop that do not depend on the x of its nodes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Hop {
-    /// Transmit powers of the hop's node nearer to Tx, and of its node nearer to Rx, W.
+    /// Transmit powers of the node nearer to Tx and of the node nearer to Rx, W.
     pub(super) powers_w: [f64; 2],
     pub(super) factor: f64,
     levels_m: [f64; 2],
     pub(super) climb_squared: f64,
-    /// Least distance of the two nodes along the line, m, due to the minimum separation of relays.
+    /// Least distance of the two nodes along x, m, because of the minimum separation.
     pub(super) least_m: f64,
 }
 
@@ -322,7 +331,7 @@ struct Best {
     before: usize,
 }
 
-/// State of the dynamic programming: for each relay so far, the best chain from Tx to each grid point.
+/// State of the dynamic programming: the best chains from Tx to each grid point of each relay.
 struct Layers<'a> {
     times: &'a Times<'a>,
     layers: Vec<(Vec<Point>, Vec<Best>)>,
@@ -336,8 +345,10 @@ impl<'a> Layers<'a> {
         }
     }
 
-    /// Adds the next relay, which may be at `points`. `known` has the times of the hops from every point of the
-    /// previous relay to every point in `points`, if they are computed already.
+    /// Adds the next relay, which may be at `points`.
+    ///
+    /// `known` has the times of the hops from every point of the previous relay to every point in `points`, if they are
+    /// already computed.
     fn add(&mut self, points: Vec<Point>, known: Option<&[f64]>) {
         let node = self.layers.len() + 1;
         let times = self.times;
@@ -396,8 +407,7 @@ impl<'a> Layers<'a> {
         (time, at)
     }
 
-    /// Returns the x of all relays, m, in the best chain whose last relay is at its grid point `at`. Relay 1 comes
-    /// first.
+    /// Returns the x of all relays, m, in the best chain whose last relay is at its grid point `at`.
     fn path(&self, mut at: usize) -> Vec<f64> {
         let mut x: Vec<f64> = Vec::with_capacity(self.layers.len());
         for (points, bests) in self.layers.iter().rev() {
@@ -412,7 +422,7 @@ impl<'a> Layers<'a> {
 /// Table of the best chains on a grid, one for each number of relays from 1.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Best chain of each number of relays from 1: its time on the grid, s Hz, and the relays' x, m.
+    /// Best chain for each number of relays from 1: its time, s Hz, and the relays' x, m.
     starts: Vec<(f64, Vec<f64>)>,
 }
 
@@ -426,7 +436,7 @@ impl Table {
         for node in 1..=times.relays() {
             let points: Vec<Point> = grid.iter().map(|&x| times.point(node, x)).collect();
             let hop = times.hop(Some(node - 1).filter(|from| *from > 0), Some(node));
-            // Equal relays have equal times between the points of the grid.
+            // Equal relays have the same times between grid points.
             let is_known = known.as_ref().is_some_and(|(other, _)| *other == hop);
             if node > 1 && !is_known {
                 let before = layers.layers.last().map(|(points, _)| points.clone());
@@ -443,7 +453,7 @@ impl Table {
         Self { starts }
     }
 
-    /// Returns the largest number of relays whose time per bit on the grid is near the least time.
+    /// Returns the largest number of relays whose time per bit on the grid is close to the least time.
     ///
     /// The time is at most 1 + `loss` times the least time of all numbers of relays. Returns 0 if no time is finite.
     pub fn largest_within(&self, loss: f64) -> u16 {

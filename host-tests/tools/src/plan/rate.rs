@@ -1,11 +1,11 @@
 //! Data rates of a chain over the number of relays.
 //!
-//! The paper assumes one frequency, so each hop sends in one of N + 1 slots: more relays raise the SIR of the worst hop but shorten
-//! the slots. With a frequency for each hop only the SIR counts. Positions are those of the largest rate where the planner has them
-//! (`carried`), and those of the largest SIR of the worst hop otherwise. Frequencies that several hops use at the same time are not
-//! modelled.
+//! The paper assumes one frequency, so each hop sends in one of N + 1 slots. More relays raise the SIR of the worst
+//! hop, but shorten the slots. With a frequency for each hop only the SIR counts. The positions have the largest rate
+//! if the planner can find them (`carried`), otherwise the largest SIR of the worst hop. Frequencies that several hops
+//! use at the same time are not modelled.
 //!
-//! Where a chain is planned for both directions, the smaller of the rate to Rx and of the rate back divided by r counts.
+//! In a chain for both directions, the smaller of two rates counts: the rate to Rx, and the rate back divided by r.
 
 use serde::Serialize;
 use uav_relay_scenario::link::{Access, Radio, worse_bps};
@@ -16,29 +16,28 @@ use uav_relay_sim::report::HopSlots;
 use super::carried::{Carried, carries_no};
 use super::{NoPlan, Number, Plan, PlanRequest, source};
 
-/// Largest number of relays for which rates are computed, if the plan of one chain takes milliseconds.
+/// Largest number of relays tried, if a plan takes milliseconds.
 const MOST_FAST: u16 = 200;
 
-/// Largest number of relays for which rates are computed, if the plan of one chain takes seconds.
+/// Largest number of relays tried, if a plan takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Largest number of relays for which rates are computed, if the positions are optimised for the rate.
+/// Largest number of relays tried, if positions are optimised for the rate.
 const MOST_SEARCHED: u16 = 60;
 
-/// Number of relays up to which rates are always computed with fitted time slots. A fitted slot is as long as its hop
-/// needs.
+/// Number of relays up to which rates are always computed with fitted time slots.
 ///
-/// The list is shorter only if so many relays do not fit on the line, or if it is proven that more relays do not
-/// increase the rate.
+/// A fitted slot is as long as its hop needs. The list of rates is shorter only if so many relays do not fit between Tx
+/// and Rx, or if more relays provably do not increase the rate.
 const LEAST_LISTED: u16 = 10;
 
 /// Data rate of a chain, bit/s.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Rate {
-    /// Rate from Tx to Rx, bit/s, of a chain that carries data only in that direction.
+    /// Rate from Tx to Rx, bit/s, of a chain for this direction only.
     There(f64),
-    /// Rates to Rx and to Tx, bit/s, of a chain that carries data in both directions.
+    /// Rates to Rx and to Tx, bit/s, of a chain for both directions.
     Both([f64; 2]),
 }
 
@@ -51,7 +50,7 @@ impl Rate {
         }
     }
 
-    /// Returns the data rate of the worst hop in `plan` while it sends, without the time that it waits.
+    /// Returns the data rate of the worst hop in `plan` during its time slot.
     pub fn of_hop(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Self {
         let worst = |sirs: &[f64]| {
             let worst = sirs.iter().copied().reduce(f64::min);
@@ -63,8 +62,9 @@ impl Rate {
         }
     }
 
-    /// Returns the linear SIRs of all hops. The first list is for the direction to Rx, the second for the direction
-    /// to Tx. `None` for a plan of one direction.
+    /// Returns the linear SIRs of all hops: in the direction to Rx, and in the direction to Tx.
+    ///
+    /// `None` for a plan of one direction.
     fn both_sirs(plan: &Plan, scenario: &Scenario) -> Option<[Vec<f64>; 2]> {
         plan.back?;
         let relays = u16::try_from(plan.places.len()).ok()?;
@@ -76,7 +76,9 @@ impl Rate {
         Some([there, plan.sirs_back(scenario)])
     }
 
-    /// Returns the time slot of each hop in `plan`. Empty without data, or if slots are not as long as each hop needs.
+    /// Returns the time slots of the hops in `plan`.
+    ///
+    /// Empty if the chain carries no data, or if the slots are not fitted (each as long as its hop needs).
     pub fn hop_slots(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Vec<HopSlots> {
         if radio.link.access != Access::Fitted {
             return Vec::new();
@@ -89,7 +91,7 @@ impl Rate {
         HopSlots::of(&times(&there, 1.0), &times(&back, scenario.reverse))
     }
 
-    /// Returns the smaller of the rate to Rx and the rate back divided by `reverse`, bit/s.
+    /// Returns the smaller of two rates, bit/s: to Rx, and back to Tx divided by `reverse`.
     pub fn worse(self, reverse: f64) -> f64 {
         match self {
             Self::There(rate_bps) => rate_bps,
@@ -98,26 +100,25 @@ impl Rate {
     }
 }
 
-/// Data rate of a chain with a certain number of relays.
+/// Data rate of a chain with this number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct RateOf {
-    /// Number of relays in the chain whose rate this is.
+    /// Number of relays in the chain.
     pub uavs: u16,
     /// Data rate of the chain, bit/s.
     pub rate_bps: Rate,
 }
 
-/// Number of relays with the largest data rate among the numbers tried, and that rate.
+/// Number of relays with the largest data rate, and this rate.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct BestRate {
     /// Number of relays with the largest data rate.
     pub best_uavs: u16,
     /// Largest data rate, bit/s.
     ///
-    /// For both directions it is the smaller of two numbers: the rate to Rx, and the rate to Tx divided by the
-    /// fraction of the rate to Rx that is required there.
+    /// For both directions it is the smaller of two rates: to Rx, and to Tx divided by the required fraction.
     pub best_rate_bps: f64,
-    /// Largest number of relays tried; all numbers from 1 to it were tried.
+    /// Largest number of relays tried. All numbers from 1 on were tried.
     pub tried_uavs: u16,
     /// True if it is proven that no other number of relays carries more; false if unknown.
     pub best_is_proven: bool,
@@ -126,20 +127,20 @@ pub struct BestRate {
 /// Data rates of a scenario's chains with 1, 2, 3 and more relays, over one data link.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Rates {
-    /// The number of relays with the largest data rate.
+    /// Number of relays with the largest data rate, and this rate.
     pub best: BestRate,
-    /// Data rate of each number of relays tried, from 1.
+    /// Data rate for each number of relays tried, from 1.
     pub all: Vec<RateOf>,
-    /// Plan with the fewest relays that carry the target rate. `None` without a target, or if no plan carries it.
+    /// Plan with the fewest relays that carry the target rate; `None` without a target or such a plan.
     pub meeting: Option<Plan>,
 }
 
 impl Rates {
     /// Plans 1, 2, 3 and more relays, and computes their data rates over `radio`.
     ///
-    /// Ends when provably no larger number carries more, or at a limit of some seconds. `target_bps` is the wanted
-    /// rate to Rx. For both directions, the rate to Tx must then be at least `target_bps` times the scenario's
-    /// fraction `reverse`.
+    /// It ends when a larger number is proven to carry no more, or at a limit of some seconds. `target_bps` is the
+    /// wanted rate to Rx. For both directions, the rate to Tx must be at least `target_bps` times the scenario's
+    /// `reverse`.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
@@ -173,7 +174,7 @@ impl Rates {
             };
             let plan = match &searched {
                 Some(searched) => searched.plan(relays),
-                // Without the proof that the positions are best.
+                // This plan has no proof that its positions are best.
                 None if reverse > 0.0 && is_single(scenario) && !ask.free_altitude => {
                     source::best(scenario, relays, ask.tolerance)
                 }
@@ -181,7 +182,7 @@ impl Rates {
             };
             let plan = match plan {
                 Ok(plan) => plan,
-                // More relays need more room.
+                // More relays do not fit either.
                 Err(none) => {
                     refused = Some(none);
                     break;
@@ -217,7 +218,7 @@ impl Rates {
             let is_one_way = !(reverse > 0.0);
             best.best_is_proven &= match radio.link.access {
                 Access::Fitted => !fits && !ask.free_altitude,
-                // The proof for both directions is for relays above the line.
+                // The proof for both directions requires that all relays keep their altitude, with y = 0.
                 _ if ask.free_altitude => is_one_way,
                 _ => is_one_way || carry_no_more(scenario, radio, *best, ask.tolerance),
             };
@@ -234,7 +235,7 @@ fn is_single(scenario: &Scenario) -> bool {
     matches!(&scenario.interference, Interference::Sources(sources) if sources.len() == 1)
 }
 
-/// Returns the largest number of relays for which the planner computes the data rate.
+/// Returns the largest number of relays that the planner tries.
 fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     let is_several =
         matches!(scenario.interference, Interference::Sources(_)) && !is_single(scenario);
@@ -247,17 +248,15 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     }
 }
 
-/// Relative gain in rate above which a larger number of relays counts as better.
-///
-/// Smaller gains are ignored, so that a larger number with almost no gain does not count as the best number.
+/// Relative gain in rate from which on a larger number of relays counts as better.
 const RISE: f64 = 1e-4;
 
-/// Largest number of relays for which [`carry_no_more`] looks for a proof.
+/// Largest number of relays in a proof by [`carry_no_more`].
 const MOST_PROVEN: u16 = MOST_FAST;
 
 /// Returns true if it is proven that no number of relays up to `tried_uavs` carries more than `best`.
 ///
-/// Used for both directions, in equal slots or with a frequency for each hop.
+/// The data is for both directions, in equal slots or with a frequency for each hop.
 fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
     let more_bps = best.best_rate_bps * (1.0 + 2.0 * tolerance);
     best.tried_uavs <= MOST_PROVEN
@@ -269,21 +268,21 @@ fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: 
         })
 }
 
-/// Upper bounds on the data rates of hops, bit/s, for any number of relays and any positions.
+/// Upper bounds on the data rates of hops, bit/s, for any number and positions of relays.
 #[derive(Clone, Copy, Default)]
 struct MostRate {
     /// Upper bound on the rate of the hop to Rx, bit/s.
     receiver_bps: f64,
     /// Upper bound on the rate of the hop from Tx, bit/s.
     first_bps: f64,
-    /// Upper bound on the rate of a hop between relays, bit/s. Relays keep their minimum separation.
+    /// Upper bound on the rate of a hop between two relays at their minimum separation, bit/s.
     relay_bps: f64,
-    /// Number of directions of the data: 1.0 for Tx to Rx only, 2.0 for both.
+    /// Number of directions of the data: 1.0 to Rx only, 2.0 for both.
     ways: f64,
 }
 
 impl MostRate {
-    /// Computes the bounds on the rates of hops; `plan` is any plan with one relay.
+    /// Computes the bounds on the rates of hops. `plan` is any plan with one relay.
     fn new(scenario: &Scenario, radio: &Radio, plan: &Plan) -> Self {
         let [first, relay] = most_between(scenario);
         Self {
@@ -296,8 +295,8 @@ impl MostRate {
 
     /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s.
     ///
-    /// For both directions the data rate is the smaller of the rate to Rx, and the rate to Tx divided by its required
-    /// fraction of the rate to Rx.
+    /// For both directions the data rate is the smaller of two rates: to Rx, and to Tx divided by the required
+    /// fraction.
     fn of(&self, radio: &Radio, relays: u16) -> f64 {
         let relays = f64::from(relays);
         match radio.link.access {
@@ -311,11 +310,10 @@ impl MostRate {
     }
 }
 
-/// Returns upper bounds on the SIR, linear, of the first hop and of a hop between relays.
+/// Returns upper bounds on the linear SIRs of the first hop and of a hop between relays.
 ///
-/// The bounds assume the strongest signal (hops as short as the minimum separation permits) and the weakest
-/// interference (each interferer received from the end of the line that is farther from it). Infinite if the
-/// interference is known only along the line.
+/// They assume the shortest permitted hop, and each interferer at its largest possible distance. Infinite if the
+/// interference is known only along the line Tx-Rx.
 fn most_between(scenario: &Scenario) -> [f64; 2] {
     let Some(scene) = Scene::new(scenario, 1) else {
         return [f64::INFINITY; 2];
@@ -347,10 +345,10 @@ fn most_between(scenario: &Scenario) -> [f64; 2] {
     ]
 }
 
-/// Returns an upper bound on the SIR (linear) at Rx for any number of relays, derived from `plan`.
+/// Returns an upper bound on the linear SIR at Rx for any number of relays, from the SIR in `plan`.
 ///
-/// The interference at Rx does not depend on the relays; the signal is largest from right above, at the lowest
-/// altitude and with the largest power.
+/// The interference at Rx does not depend on the relays. The signal is largest from a relay right above Rx, at the
+/// lowest altitude and with the largest power.
 fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
     let (Some((last, profile)), Some(sir)) = (plan.places.last(), plan.sirs.last()) else {
         return f64::INFINITY;

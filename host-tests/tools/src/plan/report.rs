@@ -23,29 +23,34 @@ pub struct HypotheticalReport {
     pub power_w: f64,
     /// Position of the hypothetical interferer along the line Tx-Rx, m.
     pub x_m: f64,
-    /// Distance of the hypothetical interferer from the line, m; positive to the right.
+    /// Lateral position of the hypothetical interferer, m; positive to the right as seen from Tx.
     pub y_m: f64,
-    /// Mean absolute error of the hypothetical interferer's power at a receiver, W. The error is against the sum of
-    /// all interferers; the mean is over the positions that relays may take.
+    /// Mean absolute error of the interference power, W, compared with the sum of all interferers.
+    ///
+    /// The mean is over the positions that relays may take.
     pub mean_abs_error_w: f64,
     /// Mean absolute error divided by the mean interference power.
     pub relative_error: f64,
-    /// SIR, linear, against all interferers, at the best positions for the hypothetical interferer. Absent if no such
-    /// positions were found.
+    /// SIR against all interferers at the best positions for the hypothetical interferer, linear.
+    ///
+    /// Absent if no such positions were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
-    /// against all interferers.
+    /// True if the plan has the positions for the hypothetical interferer.
+    ///
+    /// False if it has the best positions found against all interferers.
     pub kept: bool,
-    /// SIR lost by the use of the positions for the hypothetical interferer, relative to the plan's SIR. 0 if the plan's own positions are
-    /// the same. With fitted slots the value is the lost data rate.
+    /// Loss of SIR at the positions for the hypothetical interferer, relative to the plan's SIR.
+    ///
+    /// 0 if the plan has these positions. With fitted slots it is the loss of data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// Relative gain of the plan in SIR, in comparison with the positions for the hypothetical interferer. With fitted
-    /// slots (as long as each hop needs) it is the gain in data rate.
+    /// Gain of SIR of the plan, relative to the positions for the hypothetical interferer.
+    ///
+    /// With fitted slots it is the gain of data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
-    /// True if the data rate decides which positions are better: the slots are as long as each hop needs.
+    /// True if the data rate decides which positions are better, because the time slots are fitted.
     #[serde(skip)]
     by_rate: bool,
 }
@@ -53,21 +58,25 @@ pub struct HypotheticalReport {
 /// Data rates of a planned chain, and of other numbers of relays.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
-    /// Data rate of the chain, bit/s; to Rx and back if it is planned for both directions. Absent without a plan.
+    /// Data rate of the chain, bit/s; absent without a plan.
+    ///
+    /// A plan for both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<Rate>,
-    /// Data rate of the worst hop while it sends, bit/s; to Rx and back if planned for both directions.
+    /// Data rate of the worst hop during its time slot, bit/s.
+    ///
+    /// A plan for both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<Rate>,
-    /// Number of time slots among which the hops share the time.
+    /// Number of time slots that the hops share.
     ///
-    /// It is one per hop and direction on one frequency; one per direction if each hop has a frequency of its own.
+    /// On one frequency it is one per hop and direction. With a frequency for each hop it is one per direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
     /// Time slot of each hop and direction; empty unless `link.access` is `fitted`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hop_slots: Vec<HopSlots>,
-    /// Way in which the hops share the radio: the word in the scenario file's `link.access`.
+    /// Value of the scenario's `link.access`: how the hops share the radio.
     pub access: &'static str,
     /// Bandwidth of one frequency, Hz.
     pub bandwidth_hz: f64,
@@ -77,22 +86,22 @@ pub struct RateReport {
     /// Number of relays with the largest data rate, and that rate.
     #[serde(flatten)]
     pub best: BestRate,
-    /// Data rate of each number of relays tried; empty unless the user wants the list.
+    /// Data rate for each number of relays tried; empty unless the user wants the list.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rates: Vec<RateOf>,
-    /// Number of relays of the plan; 0 without a plan.
+    /// Number of relays in the plan; 0 without a plan.
     #[serde(skip)]
     relays: u16,
-    /// Required rate back to Tx, as a fraction of the rate to Rx; 0 for one direction.
+    /// Required rate to Tx as a fraction of the rate to Rx; 0 for one direction.
     #[serde(skip)]
     reverse: f64,
-    /// Text that says how the plan's hops share the radio.
+    /// Text about how the plan's hops share the radio.
     #[serde(skip)]
     sharing: String,
 }
 
 impl RateReport {
-    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are the rates to list.
+    /// Creates the report of the rates of `plan`. `best` is the largest rate, and `rates` are those to list.
     ///
     /// Without a plan the report has only `best` and `rates`.
     pub fn new(
@@ -151,7 +160,7 @@ impl RateReport {
         }
         let mut before = None;
         for RateOf { uavs, rate_bps } in &self.rates {
-            // With steps many numbers have the same rate; the first one is listed.
+            // With rate steps many numbers of relays have the same rate. The first is listed.
             if before != Some(*rate_bps) {
                 let (relays, verb) = relays_carry(*uavs);
                 _ = writeln!(text, "{uavs:5} {relays} {verb} {}", bps(*rate_bps));
@@ -161,7 +170,7 @@ impl RateReport {
         _ = writeln!(text, "{}", self.largest());
     }
 
-    /// Returns the sentence that tells the user the largest data rate and its number of relays.
+    /// Returns the sentence about the largest data rate and its number of relays.
     pub fn largest(&self) -> String {
         let BestRate {
             best_uavs,
@@ -223,32 +232,33 @@ const fn relays_carry(number: u16) -> (&'static str, &'static str) {
     }
 }
 
-/// SIRs of the hops in the direction from Rx to Tx. The fields `reverse`, `worst_both` and `worst_direction` are
-/// present if the relays are placed for both directions.
+/// SIRs of the hops in the direction from Rx to Tx.
+///
+/// `reverse`, `worst_both` and `worst_direction` are present if the relays are placed for both directions.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WayBack {
-    /// SIR with which the last relay receives Rx, linear.
+    /// SIR of the hop from Rx to the last relay, linear.
     pub rx_sir_back: f64,
     /// SIR of the worst hop in the direction from Rx to Tx, linear.
     pub worst_back: f64,
     /// SIR of the worst hop in the direction from Rx to Tx, dB.
     pub worst_back_db: f64,
-    /// Fraction of the SIR to Rx that the hops toward Tx must have; absent in a plan for one direction.
+    /// Required SIR toward Tx as a fraction of that toward Rx; absent in a plan for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
-    /// SIR of the worst hop of both directions, linear; an SIR toward Tx is first divided by `reverse`.
+    /// SIR of the worst hop of both directions, linear; SIRs toward Tx are first divided by `reverse`.
     ///
-    /// Absent if the relays are placed for one direction.
+    /// Absent in a plan for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_both: Option<f64>,
-    /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. The SIR of the way back
-    /// is divided by `reverse`.
+    /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if they are equal.
+    ///
+    /// SIRs toward Tx are first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_direction: Option<&'static str>,
     /// Receiver of the worst hop in the direction from Rx to Tx: 0 for Tx, otherwise the relay's index.
     #[serde(skip)]
     hop: usize,
-    /// Number of relays in the planned chain.
     #[serde(skip)]
     relays: u16,
 }
@@ -277,14 +287,14 @@ impl WayBack {
     }
 }
 
-/// Text at the end of each plan: the parts of reality that the model leaves out.
+/// Text at the end of each plan: effects that the model leaves out.
 const NOT_MODELLED: &str = "not modelled: terrain and obstacles";
 
-/// The same for a plan with terrain.
+/// Text at the end of a plan with terrain: effects that the model leaves out.
 const NOT_IN_TERRAIN: &str =
     "not modelled: buildings and trees, and terrain in front of the interferers";
 
-/// Text added to a plan for one direction: the direction from Rx to Tx is not optimised.
+/// Text at the end of a plan for one direction.
 const ONE_WAY: &str = "; not optimised: the way back from Rx to Tx";
 
 /// Report of `cargo plan`, printed as a table or as JSON.
@@ -302,14 +312,16 @@ pub struct PlanReport {
     /// Best SIR found, dB; present only if the request cannot be met and the SIR is above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
-    /// SIR of the plan's worst hop, linear. If the plan is for both directions, the worst hop of either direction
-    /// counts, and each SIR toward Tx is first divided by `reverse`. `reverse` is the required SIR toward Tx as a
-    /// fraction of that toward Rx.
+    /// SIR of the plan's worst hop, linear.
+    ///
+    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
+    /// fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// SIR of the plan's worst hop, dB. If the plan is for both directions, the worst hop of either direction counts,
-    /// and each SIR toward Tx is first divided by `reverse`. `reverse` is the required SIR toward Tx as a fraction of
-    /// that toward Rx.
+    /// SIR of the plan's worst hop, dB.
+    ///
+    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
+    /// fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
     /// SIRs in the direction from Rx to Tx; absent if the interference at Tx is unknown.
@@ -324,29 +336,31 @@ pub struct PlanReport {
     /// Requested SIR of every hop, dB; absent if the request is a number of relays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_sir_db: Option<f64>,
-    /// Best SIR, linear, that the plan's number of relays can have; only for a requested SIR.
+    /// Best SIR that the plan's number of relays can have, linear; only for a requested SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_sir: Option<f64>,
-    /// Best SIR, dB, that the plan's number of relays can have; only for a requested SIR.
+    /// Best SIR that the plan's number of relays can have, dB; only for a requested SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_sir_db: Option<f64>,
     /// Name of the algorithm that found the relays' positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub how: Option<&'static str>,
-    /// True if it is proven that no positions are better. For a requested SIR: that no fewer relays suffice. False if
-    /// this is unknown; absent if there is no plan.
+    /// True if it is proven that no positions are better.
+    ///
+    /// For a requested SIR: that no fewer relays suffice. False if this is unknown. Absent if there is no plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
-    /// Number of the paper's theorem, 1 to 3, that placed the only relay. 4 means one relay beside the line, and 5
-    /// one relay for both directions; both are not in the paper.
+    /// Number of the theorem that placed the only relay, 1 to 3 as in the paper.
+    ///
+    /// 4 is one relay with a lateral offset, and 5 one relay for both directions. Both are not in the paper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
     /// Case number of the theorem in the paper; 0 for a case that the paper omits.
     ///
-    /// For Theorem 3 the edge of the box: 1 lowest, 2 highest, 3 above Rx. For one relay beside the line: 1 where the circles of
-    /// equal SIR touch, 2 the maximum of the first hop, 3 above Rx, 4 to 6 an edge of the corridor along x, along y or upward, 7
-    /// and 8 with the interferer at Tx or Rx. For one relay both ways: 1 above Tx, 2 above Rx, 3 where two SIRs are equal, 4 the
-    /// maximum of one SIR.
+    /// For Theorem 3 it is the edge of the allowed positions: 1 lowest, 2 highest, 3 above Rx. For one relay with a
+    /// lateral offset: 1 where the circles of equal SIR touch, 2 the maximum of the first hop's SIR, 3 above Rx, 4 to 6
+    /// an edge of the allowed positions along x, along y or upward, 7 and 8 with the interferer at Tx or Rx. For one
+    /// relay and both directions: 1 above Tx, 2 above Rx, 3 where two SIRs are equal, 4 the maximum of one SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
     /// Explanation of the theorem's case for the user: why the relay goes to its position.
@@ -354,25 +368,25 @@ pub struct PlanReport {
     pub case_words: Option<String>,
     /// Reports of the relays, in order from Tx.
     pub relays: Vec<RelayReport>,
-    /// SIR with which Rx receives the last relay, linear.
+    /// SIR of the hop from the last relay to Rx, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir: Option<f64>,
-    /// SIR with which Rx receives the last relay, dB.
+    /// SIR of the hop from the last relay to Rx, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
     /// Receiver noise, if it is computed from a bandwidth and a noise figure; otherwise absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseReport>,
-    /// Hypothetical interferer in place of several; absent unless there are several.
+    /// Hypothetical interferer that replaces several; absent unless there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
     /// Terrain below the chain; absent without elevation files.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub terrain: Option<TerrainReport>,
-    /// Gain of positions that are chosen for the terrain; absent for other positions.
+    /// Gain of positions chosen for the terrain; absent for other positions.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub over_terrain: Option<OverTerrain>,
-    /// Flight over the terrain, with the loss of each relay; absent without elevation files.
+    /// Flight over the terrain, and the chain after each relay's loss; absent without elevation files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flight: Option<Flight>,
     /// Reason why the flight over the terrain was not simulated; absent if it was.
@@ -381,19 +395,19 @@ pub struct PlanReport {
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
-    /// Location of the interferer in its area by relays with `[listen]`; absent without `[listen]`.
+    /// Location of the interferer in its area by relays; absent without `[listen]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub locating: Option<Locating>,
-    /// True if relays may leave the line sideways: the table then has a column for y.
+    /// True if relays may have a lateral position. The table then has a column for y.
     #[serde(skip)]
     pub room: bool,
-    /// Unit in which the table shows SIRs: the unit of the user's request.
+    /// Unit of SIRs in the table, as in the user's request.
     #[serde(skip)]
     pub unit: Unit,
 }
 
 impl PlanReport {
-    /// Creates the report of `plan`. `number` is the request, `unit` the unit of SIRs in the table.
+    /// Creates the report of `plan`. `number` is the request, and `unit` the unit of SIRs in the table.
     pub fn new(plan: &Plan, number: Number, unit: Unit) -> Self {
         let sir = plan.sir();
         let rx_sir = plan.sirs.last().copied();
@@ -453,7 +467,7 @@ impl PlanReport {
         }
     }
 
-    /// Creates the report of a request that cannot be met: the reason and the best SIR found (linear).
+    /// Creates the report of a request that cannot be met, with the reason and the best SIR (linear).
     pub fn unmet(why: &Why, best_sir: Option<f64>, number: Number, unit: Unit) -> Self {
         let (uavs, target_sir) = match number {
             Number::Of(relays) => (Some(relays), None),
@@ -471,7 +485,7 @@ impl PlanReport {
         }
     }
 
-    /// Adds the SIR of each hop in the direction from Rx to Tx, if the interference at Tx is known.
+    /// Adds the SIRs of the hops from Rx to Tx, if the interference at Tx is known.
     #[must_use]
     pub fn with_way_back(mut self, scenario: &Scenario, plan: &Plan) -> Self {
         let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
@@ -515,8 +529,9 @@ impl PlanReport {
         }
     }
 
-    /// Adds the terrain below the chain, if it is known. `error` states why the plan cannot be flown above this
-    /// terrain.
+    /// Adds the terrain below the chain, if it is known.
+    ///
+    /// `error` states why the plan cannot be flown.
     #[must_use]
     pub fn above(self, terrain: Option<TerrainReport>, error: Option<String>) -> Self {
         Self {
@@ -656,14 +671,16 @@ pub struct NoiseReport {
     pub figure_db: f64,
     /// Reference temperature T0 of the noise, K.
     pub temperature_k: f64,
-    /// Noise power divided by the receive antenna gain, W, as the SIRs use it. If the antenna gains differ, the lower
-    /// gain is used.
+    /// Noise power divided by the receive antenna gain, W, as the SIRs use it.
+    ///
+    /// If the antenna gains differ, the lower gain is used.
     pub effective_w: f64,
 }
 
 impl NoiseReport {
-    /// Returns the noise of a scenario with its parameters. `None` without noise, or if the scenario states the noise
-    /// power itself.
+    /// Returns the noise of a scenario with its parameters.
+    ///
+    /// `None` without noise, or if the scenario gives the noise power itself.
     pub fn of(noise: &Noise) -> Option<Self> {
         let power_w = noise.receiver_w();
         let is_made = noise.power_dbm.is_none() && power_w > 0.0;

@@ -1,4 +1,4 @@
-//! Plans against one interferer: one relay by a theorem, several at their own altitudes.
+//! Plans against one interferer or a field: one relay by a theorem, several at their own altitudes.
 
 use uav_relay::optimiser::plan as silent;
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
@@ -25,7 +25,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
     let plan = fewest(scenario, target, tolerance, how)?;
     let relays = plan.mission.relays();
     let most = best(scenario, relays, tolerance);
-    // Fewer relays are excluded one number after the other: with different powers fewer may do better.
+    // With different powers fewer relays may do better, so each smaller number is excluded.
     let proven = plan.proven
         || scenario.reverse > 0.0
             && (1..relays)
@@ -38,7 +38,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
     })
 }
 
-/// Returns the best position of one relay for both directions, above the line at its altitude.
+/// Returns the best x of one relay for both directions. It keeps its altitude, and y = 0.
 pub(super) fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, 1, tolerance)?;
     let altitude_m = briefed.profile(1).altitude_m;
@@ -83,8 +83,9 @@ pub(super) fn best_both_ways(
     Ok(Plan { proven, ..plan })
 }
 
-/// Returns the best position of a single relay, by one of the closed solutions, such as Theorem 1. A relay with a
-/// fixed altitude stays above the line.
+/// Returns the best position of a single relay by a closed solution, such as Theorem 1.
+///
+/// A relay with a fixed altitude has no lateral offset.
 pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
@@ -123,7 +124,7 @@ pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPl
     })
 }
 
-/// Returns `mission` with the relay's own altitude as the only permitted altitude.
+/// Returns `mission` with the relay's altitude as the only permitted altitude.
 fn at_one_altitude(mission: &Mission, profile: Profile) -> Mission {
     let config = MissionConfig {
         band: Band::at(profile.altitude_m),
@@ -187,7 +188,7 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
     ))
 }
 
-/// Returns the plan of the relays at their own altitudes by Algorithm 1, computed without messages.
+/// Returns the plan of Algorithm 1 for relays at their own altitudes, computed without messages.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let target = solved(&briefed)?;
@@ -207,7 +208,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// Returns the target SIR, linear, on which the relays would agree.
+/// Returns the target SIR, linear, that the relays would agree on.
 pub(super) fn solved(briefed: &ProfiledMission) -> Result<f32, NoPlan> {
     silent::solve(&briefed.mission, Schedule::Bracketed, |index| {
         briefed.profile(index)
@@ -221,8 +222,9 @@ pub(super) fn placed(briefed: &ProfiledMission, target: f32) -> Option<Vec<Place
     fewest::places(&briefed.mission, target, |index| briefed.profile(index))
 }
 
-/// Returns the plan with the fewest relays that give every hop the SIR `target`. `how` names the method. The relays
-/// stay at their own altitudes.
+/// Returns the plan with the fewest relays that give every hop the SIR `target`.
+///
+/// The relays keep their altitudes. `how` names the method.
 pub(super) fn fewest(
     scenario: &Scenario,
     target: f64,
@@ -234,14 +236,15 @@ pub(super) fn fewest(
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// Returns the mission of the fewest relays that give every hop the SIR `target`. The relays stay at their own
-/// altitudes. The `bool` is true if it is proven that fewer relays do not suffice.
+/// Returns the mission of the fewest relays that give every hop the SIR `target`.
+///
+/// The relays keep their altitudes. The `bool` is true if it is proven that fewer relays do not suffice.
 pub(super) fn enough(
     scenario: &Scenario,
     target: f64,
     tolerance: f64,
 ) -> Result<(ProfiledMission, bool), NoPlan> {
-    // The number is not known yet: profiles of relays beyond it are ignored later.
+    // The number of relays is not known yet. Profiles of relays beyond it are ignored later.
     let alone = ProfiledMission::new(scenario, 1, tolerance)?;
     let own = ProfiledMission {
         own: own_profiles(scenario, &alone.mission),
@@ -262,7 +265,7 @@ pub(super) fn enough(
     Err(NoPlan::Unmet(why, Some(best)))
 }
 
-/// Returns the index and profile of every relay that the scenario lists, even beyond the plan.
+/// Returns the index and profile of every relay in the scenario, even if the plan has fewer relays.
 fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
     let common = mission.config().common;
     scenario
@@ -280,7 +283,8 @@ fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
 
 // Plans in a field of interference.
 //
-// The field does not depend on the altitude, and the outer hops are best at the lowest one, so free altitudes reduce to that.
+// The field does not depend on the altitude, and the first and last hop are best at the lowest one. Free altitudes are
+// therefore the lowest altitude.
 
 pub(super) fn plan_in_field(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     let scenario = if ask.free_altitude {
@@ -326,7 +330,7 @@ fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Pla
         return Ok(briefed.plan(&[found.place], "Algorithm 3", true));
     }
     if !briefed.own.is_empty() {
-        // Different powers or altitudes: the positions that the relays agree on by themselves.
+        // With different powers or altitudes: the positions that the relays agree on in flight.
         let target = solved(&briefed)?;
         let places = placed(&briefed, target).ok_or_else(nothing)?;
         return Ok(briefed.plan(&places, "Algorithm 4", false));
@@ -345,14 +349,14 @@ fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Pla
     ))
 }
 
-/// Explanation, for the user, of a single relay's position if the interferer is at Rx.
+/// Explanation for the user: position of a single relay if the interferer is at Rx.
 const DROWNED: &str =
     "the interferer is at Rx, so the SIR of the second hop is 0 wherever the drone is";
 
-/// Explanation, for the user, of a single relay's position if the interferer is at Tx.
+/// Explanation for the user: position of a single relay if the interferer is at Tx.
 const LEVEL: &str = "the drone goes directly above Rx: the interferer is at Tx, so the first hop has the same SIR everywhere, and the second is best there";
 
-/// Explains to the user why a relay with a fixed altitude goes to its x (a case of Theorem 1).
+/// Explains to the user why a relay with a fixed altitude goes to its x: a case of Theorem 1.
 pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
     use theorems::PlaceCase;
     match case {
@@ -388,7 +392,7 @@ pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
     }
 }
 
-/// Explains to the user why a relay with a fixed x flies at its altitude (a case of Theorem 2).
+/// Explains to the user why a relay with a fixed x flies at its altitude: a case of Theorem 2.
 pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
     use theorems::AltitudeCase;
     match case {
@@ -405,7 +409,7 @@ pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
     }
 }
 
-/// Explains to the user why a relay goes to its x and altitude, with the number of Theorem 3's case.
+/// Explains to the user why a relay goes to its x and altitude. Also returns the case of Theorem 3.
 pub(super) fn anywhere_above(case: theorems::FreeCase) -> (u8, String) {
     match case {
         theorems::FreeCase::Lowest(case) => (1, format!("at the lowest permitted altitude, {}", along_x(case))),
@@ -419,7 +423,7 @@ pub(super) fn anywhere_above(case: theorems::FreeCase) -> (u8, String) {
     }
 }
 
-/// Explains to the user why a single relay that may leave the line goes to its position.
+/// Explains to the user why a single relay goes to its position with a lateral offset.
 pub(super) fn sideways(case: aside::AsideCase) -> &'static str {
     use aside::{AsideCase, EdgeCoordinate};
     match case {

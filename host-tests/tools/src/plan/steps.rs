@@ -1,20 +1,23 @@
-//! Positions for fitted slots of a radio with rate steps, by a search over exact reaches of steps.
+//! Positions for fitted slots of a radio with rate steps, by a search over exact positions.
 //!
-//! The time of a hop is constant between two steps, so a grid misses positions that exist only at a step's exact reach: a chain whose
-//! hops all have to reach as far as their steps allow is lost by a millimetre. This search extends chains hop by hop. From a relay's
-//! position the next relay is tried at the farthest position of each step, forward and backward:
+//! A rate step is a data rate of the radio, with the least SINR that it requires. The time of a hop is constant between
+//! two steps. The hops of the best chain may therefore be exactly as long as their steps allow, and a grid misses such
+//! a chain by a millimetre. This search extends chains hop by hop. It tries the next relay at the farthest position of
+//! each step, forward (to Rx) and backward (to Tx):
 //!
 //! ```text
 //! forward     largest y with  P(k) g(y - x) / (I(y) + N) >= step      I at the receiver y: a scan of a table, then bisection
 //! backward    largest y with  P(k + 1) g(y - x) / (I(x) + N) >= step  I at the receiver x: closed form
 //! ```
 //!
-//! A chain is dropped if another one with as many relays takes no more time, ends farther, and hears the next relay from as far on
-//! the way back at each step. In one direction the farther end is always the better one. With a way back a relay before an interferer
-//! may be better off farther from it: there the points of a grid are tried, too.
+//! A chain is dropped if another chain of as many relays takes no more time, ends farther from Tx, and receives the
+//! next relay from as far away in the backward direction at each step. In one direction only, the farther end is always
+//! better. For both directions, a relay before an interferer may be better farther away from it, so points of a grid
+//! are tried there, too.
 //!
-//! A chain is dropped, too, if a lower bound on the time of its remaining hops excludes a gain. The bound takes the line in cells, and a
-//! hop between two cells as if it had the shortest length and the least interference of the cells.
+//! A chain is also dropped if a lower bound on the time of its remaining hops excludes a gain. For the bound the line
+//! Tx-Rx is divided into cells. A hop between two cells counts with their smallest distance and least interference.
+//! Times for one bit are in s Hz: the time in s for a bandwidth of 1 Hz.
 
 use std::rc::Rc;
 
@@ -22,64 +25,63 @@ use uav_relay_scenario::number::narrow;
 
 use super::path::{Hop, Point, Times};
 
-/// Number of equal cells into which the search divides the line from Tx to Rx.
+/// Number of equal cells between Tx and Rx.
 const CELLS: u16 = 800;
 
-/// Least relative decrease of a chain's time for one bit that the search looks for.
+/// Smallest relative gain in a chain's time for one bit that the search looks for.
 const GAIN: f64 = 2e-5;
 
-/// Relative difference up to which the search treats two chains' times for one bit as equal. Of two such chains the search keeps the one
-/// whose last relay is farther from Tx.
+/// Largest relative difference of two chains' times for one bit that count as equal.
+///
+/// Of two such chains the search keeps the one whose last relay is farther from Tx.
 const SAME: f64 = 1e-4;
 
-/// Loss of reach in the return direction (to Tx) that the search neglects. It is a fraction of the line Tx-Rx.
+/// Backward loss of hop length that the search neglects, as a fraction of the distance Tx-Rx.
 const SLIGHT: f64 = 1e-6;
 
-/// Number of bisection steps in the search for the farthest x at which a hop meets a rate step. The search starts
-/// from one cell, which is one of [`CELLS`] equal parts of the line. A rate step is a data rate of the radio, and the
-/// least SINR that it requires.
+/// Number of bisection steps, within one cell, for the farthest x at which a hop meets a rate step.
 const HALVINGS: u8 = 40;
 
-/// First hops of a chain, which end at a relay at `point`. They need `time` for one bit, in s Hz: the time in s for a
-/// bandwidth of 1 Hz.
+/// First hops of a chain, up to the relay at `point`. They need `time` for one bit, s Hz.
 #[derive(Clone, Copy)]
 struct Label {
     point: Point,
     time: f64,
-    /// Index, in the list of chains that end at the previous relay, of the chain that this chain continues.
+    /// Index of the chain that this chain continues, among those that end at the previous relay.
     before: usize,
 }
 
-/// Tables of one hop for the search of positions: limits of its sender's x and its time for a bit. The radio has rate
-/// steps: data rates, each with the least SINR that it requires.
+/// Tables of one hop: limits of its sender's x, and its time for one bit.
 struct Reaches {
     hop: Hop,
-    /// Smallest x of the sender, m, at which the receiver has the SINR of a rate step. There is a row for each rate
-    /// step of the radio, with a value for each x of the receiver on the grid. Infinite if the sender would have to
-    /// be closer to the receiver than the minimum separation.
+    /// Smallest x of the sender, m, at which the receiver meets a rate step.
+    ///
+    /// There is a row for each rate step, with a value for each x of the receiver on the grid. Infinite if the hop
+    /// would be shorter than the minimum separation.
     nearest: Vec<Vec<f64>>,
-    /// Lower bounds on the hop's time for one bit, s Hz (time in s for a bandwidth of 1 Hz). There is a row for each
-    /// cell of the sender, with a value for each cell of the receiver.
+    /// Lower bounds on the hop's time for one bit, s Hz.
+    ///
+    /// There is a row for each cell of the sender, with a value for each cell of the receiver.
     least: Vec<f64>,
 }
 
-/// Search for the chain with the least time for one bit, for a radio with rate steps. Each time slot is as long as
-/// its hop needs (fitted slots).
+/// Search for the chain with the least time for one bit, for fitted slots and rate steps.
 struct Search<'a> {
     times: &'a Times<'a>,
-    /// x of the edges of all cells, m, ascending. Each value is exact as an f32.
+    /// x of the edges of all cells, m, ascending. Each is exact as an f32.
     grid: Vec<f64>,
-    /// Width of a cell of the line, m.
+    /// Width of a cell, m.
     width: f64,
-    /// Upper limit on a chain's time for one bit, s Hz: the time in s for a bandwidth of 1 Hz.
+    /// Upper limit on a chain's time for one bit, s Hz.
     below: f64,
 }
 
-/// Returns the x of the relays, m, in the best chain that needs less than `time` for one bit. `time` is in s Hz: the
-/// time in s for a bandwidth of 1 Hz. `None` if there is no such chain, or if the radio has no rate steps.
+/// Returns the x of the relays, m, in the best chain that needs less than `time` for one bit, s Hz.
+///
+/// `None` if there is no such chain, or if the radio has no rate steps.
 pub(super) fn shorter(times: &Times<'_>, time: f64) -> Option<Vec<f64>> {
     let slowest = times.steps.first()?.1;
-    // No chain that carries data needs more.
+    // Every chain that carries data needs at most this time.
     let most = (times.relays() + 1) as f64 * (1.0 + times.reverse) / slowest;
     let d = times.scene.distance_m;
     let edge = |cell| f64::from(narrow(d * f64::from(cell) / f64::from(CELLS)));
@@ -102,7 +104,7 @@ impl Search<'_> {
             let same = kinds.iter().find(|kind| kind.hop == hop).cloned();
             kinds.push(same.unwrap_or_else(|| Rc::new(self.reaches(hop, node))));
         }
-        // The farthest x of each relay leaves room for the relays after it.
+        // The largest x of each relay leaves room for the relays after it.
         let mut limit = self.times.scene.distance_m;
         let mut limits: Vec<f64> = Vec::with_capacity(relays);
         for kind in kinds.iter().rev() {
@@ -138,8 +140,7 @@ impl Search<'_> {
         Some(x)
     }
 
-    /// Computes the tables of `hop`, whose receiver in the direction to Rx is relay `node`. They have the sender's
-    /// smallest x for each rate step of the radio, and lower bounds on the time for one bit.
+    /// Computes the tables of `hop`, whose receiver in the direction to Rx is relay `node`.
     fn reaches(&self, hop: Hop, node: usize) -> Reaches {
         let points: Vec<Point> = self
             .grid
@@ -180,8 +181,9 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the cells of the line for relay `node`: the start and the least disturbance of each. The disturbance
-    /// is interference plus noise, W: the smaller of its values at the two edges of the cell.
+    /// Returns the start of each cell, and the least interference plus noise of relay `node` in it.
+    ///
+    /// It is the smaller of the values at the two edges of the cell, W.
     fn quietest(&self, node: usize) -> Vec<Point> {
         let points: Vec<Point> = self
             .grid
@@ -196,8 +198,9 @@ impl Search<'_> {
         cells.collect()
     }
 
-    /// Returns lower bounds on the time for one bit of all hops after a relay. The times are in s Hz (s for a
-    /// bandwidth of 1 Hz). There is a row for each relay, with a value for each cell in which the relay may be.
+    /// Returns lower bounds on the time for one bit of all hops after a relay, s Hz.
+    ///
+    /// There is a row for each relay, with a value for each cell that the relay may be in.
     fn bounds(&self, kinds: &[Rc<Reaches>]) -> Vec<Vec<f64>> {
         let relays = kinds.len();
         let (last, rx) = (self.times.hop(Some(relays), None), self.times.rx());
@@ -233,11 +236,10 @@ impl Search<'_> {
         cell
     }
 
-    /// Extends each chain of `labels` by a hop to relay `node`. Returns the new chains that are worth keeping.
+    /// Extends each chain of `labels` by a hop to relay `node`. Returns the chains that are worth keeping.
     ///
-    /// `limit` is the largest permitted x of relay `node`, m. `bound` has one number for each cell, that is for each
-    /// of [`CELLS`] equal parts of the line. The number is a lower bound on the time for one bit of all hops after
-    /// the relay, if the relay is in this cell. Its unit is s Hz: the time in s for a bandwidth of 1 Hz.
+    /// `limit` is the largest permitted x of relay `node`, m. `bound` has a value for each cell that the relay may be
+    /// in: a lower bound on the time for one bit of all hops after the relay, s Hz.
     fn extended(
         &self,
         labels: &[Label],
@@ -285,9 +287,9 @@ impl Search<'_> {
         self.undominated(found, &backward)
     }
 
-    /// Collects in `ends` the x of relay `node`, m, at which its hop from `from` just meets a rate step. A rate step
-    /// is a data rate of the radio, and the least SINR that it requires. Both directions of the hop count. The x of
-    /// Rx is included; the list is not sorted.
+    /// Collects in `ends` the x of relay `node`, m, at which its hop from `from` just meets a rate step.
+    ///
+    /// Both directions of the hop count. The x of Rx is included. The list is not sorted.
     fn ends(&self, from: Point, node: usize, kind: &Reaches, ends: &mut Vec<f64>) {
         ends.clear();
         ends.push(self.times.scene.distance_m);
@@ -319,9 +321,10 @@ impl Search<'_> {
         }
     }
 
-    /// Returns those of `labels` (first hops of chains) that can lead to the best chain. A label is left out if another
-    /// label ends farther from Tx, takes no more time, and receives a next node at the same x or farther away in the
-    /// return direction.
+    /// Returns those of `labels` (first hops of chains) that can lead to the best chain.
+    ///
+    /// A label is left out if another label ends farther from Tx, takes no more time, and is no worse for data to Tx.
+    /// It is no worse if it receives the next node from as far away.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -329,7 +332,7 @@ impl Search<'_> {
             let by_time = order(one).total_cmp(&order(other));
             by_time.then(other.point.x.total_cmp(&one.point.x))
         });
-        // Positions that a kept chain dominates: intervals.
+        // Intervals of positions that are worse than a kept chain.
         let mut covered: Vec<[f64; 2]> = Vec::new();
         labels.retain(|label| {
             let x = label.point.x;
@@ -345,27 +348,26 @@ impl Search<'_> {
     }
 }
 
-/// Table of the largest x of the next node from which a relay can receive. It is for the return direction (to Tx).
-/// The largest x depends on the relay's x and on the rate step. A rate step is a data rate of the radio, and the
-/// least SINR that it requires.
+/// Table of the farthest x of the next node that a relay can receive in the direction to Tx.
 ///
-/// The search uses the table to decide if a relay at a smaller x is worse than one at a larger x with no more time.
+/// It depends on the relay's x and on the rate step. The search uses it to compare a relay at a smaller x with one at a
+/// larger x.
 struct Backward {
     hop: Hop,
-    /// Largest x of the next node, m, from which a relay at a grid point receives a rate step. A rate step is a data
-    /// rate of the radio, and the least SINR that it requires. The table has a row for each rate step, with a value
-    /// for each grid point.
+    /// Largest x of the next node, m, at which a relay at a grid point receives it at a rate step.
     ///
-    /// The x is at most the x of Rx.
+    /// There is a row for each rate step, with a value for each grid point. The x is at most the x of Rx.
     farthest: Vec<Vec<f64>>,
-    /// x of the grid points, m, that can be better than some grid point with a larger x. In the return direction, a
-    /// useful point receives a next node that is farther from Tx.
+    /// x of the useful grid points, m.
+    ///
+    /// At some rate step, a useful point can receive a more distant node than a grid point with a larger x can.
     useful: Vec<f64>,
 }
 
 impl Backward {
-    /// Creates the table of the hop by which relay `node` receives in the return direction, to Tx. The sender of that
-    /// hop is the next relay, or Rx for the last relay. The table is empty for data from Tx to Rx only.
+    /// Creates the table of the hop that relay `node` receives in the direction to Tx.
+    ///
+    /// Its sender is the next relay, or Rx. The table is empty for data to Rx only.
     fn new(search: &Search<'_>, node: usize) -> Self {
         let times = search.times;
         let next = Some(node + 1).filter(|next| *next <= times.relays());
@@ -402,8 +404,9 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the smallest x, m, such that no position between this x and `point` is better than `point`. A position
-    /// is better if it receives the next relay's signal from farther away, at some rate step of the way back.
+    /// Returns the smallest x, m, from which on no position before `point` is better than `point`.
+    ///
+    /// A position is better if it receives the next node from a larger x, at some rate step of the direction to Tx.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;
@@ -424,8 +427,9 @@ impl Backward {
     }
 }
 
-/// Returns the smallest x of a hop's sender, m, that gives the receiver at `to` the SINR `sinr`. The sender is the
-/// hop's node nearer to Tx. The result is infinite if the two nodes would be closer than the minimum separation.
+/// Returns the smallest x of a hop's sender, m, at which the receiver at `to` has the SINR `sinr`.
+///
+/// The sender is the node nearer to Tx. Infinite if the hop would be shorter than the minimum separation.
 fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     let squared = hop.powers_w[0] / (hop.factor * sinr * to.disturbance_w) - hop.climb_squared;
     if squared < hop.least_m * hop.least_m {
@@ -434,7 +438,7 @@ fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     to.x - squared.sqrt()
 }
 
-/// Returns the longest hop along x, m, on which `to` receives the next node with the SINR `sinr`.
+/// Returns the longest hop along x, m, from the next node to `to` with the SINR `sinr`.
 ///
 /// `None` if the next node is too weak at any x.
 fn reach(hop: &Hop, sinr: f64, to: Point) -> Option<f64> {

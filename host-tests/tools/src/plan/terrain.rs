@@ -14,25 +14,26 @@ use uav_relay_terrain::report::{FreeSpace, InterfererHeight, TerrainReport};
 use super::Plan;
 use crate::figures::chart::{Axis, Chart, Line, Look, Stroke};
 
-/// Position error of a relay, m, unless `companion.position_error_m` gives another value. It is the companion's
-/// default.
+/// Position error of a relay, m, if the scenario has no `companion.position_error_m`.
+///
+/// It is the companion's default.
 pub const POSITION_ERROR_M: f64 = 1.0;
 
 /// Elevation model of a scenario.
 #[expect(missing_debug_implementations, reason = "millions of heights")]
 pub struct Elevation {
-    /// Terrain of the scenario; its files are the files of `--dem`, if given.
+    /// Terrain of the scenario. With `--dem`, its files are those of the option.
     pub spec: TerrainSpec,
     terrain: Terrain,
-    /// Position error within which obstacles below a relay count, m.
+    /// Position error of the relays, m. Obstacles within it count as below the relay.
     position_error_m: f64,
 }
 
 impl Elevation {
-    /// Reads the elevation files of the scenario, or the files in `dem`, if given. `None` if there are no files.
+    /// Reads the elevation files in `dem`, or else of the scenario; `None` if there are no files.
     ///
     /// # Errors
-    /// A line that names the file and the problem.
+    /// A text that names the file and the problem.
     pub fn load(
         scenario: &Scenario,
         dem: &[PathBuf],
@@ -55,17 +56,17 @@ impl Elevation {
         }))
     }
 
-    /// Returns the terrain along the line of `scenario`.
+    /// Returns the terrain along the line Tx-Rx of `scenario`.
     ///
     /// # Errors
-    /// A line that names the site: the scenario has none, the files do not cover it, or its height contradicts them.
+    /// A text that names the site: the scenario has none, the files do not cover it, or its height contradicts them.
     pub fn ground(&self, scenario: &Scenario) -> Result<Ground<'_>, String> {
         let line = scenario.line.as_ref().ok_or("site: is missing")?;
         let ground = Ground::new(&self.terrain, line.axis, line.sites, self.spec.mast_m)?;
         Ok(ground.with_error_m(self.spec.error_m))
     }
 
-    /// Returns the scene of `relays` relays, whose interferers stand on the ground.
+    /// Returns the scene of `relays` relays, with interferers that stand on the ground.
     ///
     /// `None` in a field of interference. An interferer that the files do not cover is at altitude 0.
     ///
@@ -83,7 +84,7 @@ impl Elevation {
         }))
     }
 
-    /// Returns the lowest and highest altitude of each interferer; none if the interference is a field.
+    /// Returns the lowest and highest altitude of each interferer; empty in a field of interference.
     fn interferers(&self, scenario: &Scenario) -> Result<Vec<InterfererHeight>, String> {
         let Interference::Sources(sources) = &scenario.interference else {
             return Ok(Vec::new());
@@ -115,13 +116,12 @@ impl Elevation {
         Ok(each.collect())
     }
 
-    /// Returns the lowest and the highest ground from Tx to Rx, m above the sea.
+    /// Returns the lowest and the highest ground at most `aside_m` beside the line Tx-Rx, m above the sea.
     ///
-    /// The ground counts up to `aside_m` beside the line.
-    /// The highest ground is raised by the error of the heights.
+    /// The highest ground includes the assumed error of the heights.
     ///
     /// # Errors
-    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    /// A text that names the place: it is not covered by the elevation files, or has no height.
     pub fn corridor_m(&self, scenario: &Scenario, aside_m: f64) -> Result<[f64; 2], String> {
         let ground = self.ground(scenario)?;
         let [from, to] = [[0.0, -aside_m], [scenario.distance_m, aside_m]];
@@ -138,7 +138,7 @@ impl Elevation {
     /// Returns the report of the terrain below `plan`.
     ///
     /// # Errors
-    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    /// A text that names the place: it is not covered by the elevation files, or has no height.
     pub fn report(&self, scenario: &Scenario, plan: &Plan) -> Result<TerrainReport, String> {
         let chain = plan.chain();
         let relays = u16::try_from(chain.len()).unwrap_or(u16::MAX);
@@ -160,9 +160,9 @@ impl Elevation {
         })
     }
 
-    /// Returns a line that states why the chain of `report` cannot be flown; `None` if it can.
+    /// Returns the reason why the chain of `report` cannot be flown; `None` if it can.
     ///
-    /// If `allow_blocked` is true, blocked hops are no reason.
+    /// With `allow_blocked`, blocked hops are no reason.
     pub fn problem(&self, report: &TerrainReport, allow_blocked: bool) -> Option<String> {
         let most_m = self.spec.above_ground_max_m;
         let blocked = report.blocked().filter(|_| !allow_blocked);
@@ -188,7 +188,7 @@ impl Elevation {
 
 /// Returns points [x, y, height] of an area, m, among them its highest and its lowest ground.
 ///
-/// These are at nodes of the elevation model inside, or on the boundary.
+/// The highest and lowest ground are at nodes of the elevation model, or on the boundary.
 fn heights(ground: &Ground<'_>, area: &Area) -> Result<Vec<[f64; 3]>, String> {
     let mut points = Vec::new();
     let corners = area.corners();
@@ -208,7 +208,7 @@ fn heights(ground: &Ground<'_>, area: &Area) -> Result<Vec<[f64; 3]>, String> {
 
 /// Returns the picture of the profile: ground, hops with the first Fresnel zone, and nodes.
 ///
-/// Heights are raised by the curvature of the earth with 4/3 of its radius, so that hops are straight.
+/// Heights include the curvature of an earth of 4/3 of its radius, so that hops are straight.
 pub fn chart(report: &TerrainReport, scenario: &Scenario) -> Chart {
     let wavelength_m = LIGHT_M_S / scenario.channel.carrier_hz;
     let raised = |x: f64, height: f64| (x, height + bulge_m(x, scenario.distance_m));

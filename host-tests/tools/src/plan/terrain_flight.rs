@@ -1,9 +1,9 @@
-//! Flight over terrain of relays that choose x by themselves: their altitudes, and checks.
+//! Flight of relays over terrain: search for their altitudes, and checks.
 //!
-//! Relays in flight know no terrain. They keep the altitude that their configuration gives them, and choose x by Algorithm 1. The search
-//! therefore changes only altitudes. It finds the best altitudes at the x that the relays choose, by dynamic programming, and
-//! repeats this with the x that the relays choose at these altitudes. Then it changes the altitude of one relay after the other, and
-//! raises each relay as far as that costs almost no SIR.
+//! Relays in flight know no terrain. They keep the altitude in their configuration, and choose x by Algorithm 1. The
+//! search therefore changes only altitudes. By dynamic programming it finds the best altitudes for the x of the relays.
+//! At these altitudes the relays choose other x, so the search is repeated. Then the altitude of one relay after the
+//! other is changed. At last each relay is raised as far as that costs almost no SIR.
 
 use std::fmt;
 
@@ -25,25 +25,25 @@ use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
 use super::terrain::Elevation;
 use super::{NoPlan, Plan, ProfiledMission, source};
 
-/// Number of altitudes of a relay that are tried between the lowest and the highest altitude.
+/// Number of altitudes that are tried for each relay.
 const LEVELS: u32 = 40;
 
-/// Largest number of searches for altitudes. Each search keeps the x that the relays choose with the last altitudes.
+/// Largest number of searches for altitudes. Each uses the x that the relays choose at the previous altitudes.
 const ROUNDS: u32 = 6;
 
-/// First and last step, m, by which the search changes the altitude of one relay.
+/// First and last change of one relay's altitude in the search, m.
 const STEPS_M: [f64; 2] = [16.0, 0.5];
 
 /// Largest relative loss of SIR that is accepted for higher, safer altitudes: 0.01 dB.
 const SLACK: f64 = 0.0023;
 
-/// Least relative gain in SIR for which the search accepts other altitudes.
+/// Smallest relative gain in SIR that makes the search accept other altitudes.
 const GAIN: f64 = 1e-4;
 
-/// Explanation of the rooms for the user.
+/// Explanation of "room" for the user.
 pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, no clear hop becomes grazing (ground in the first Fresnel zone), and no relay is in a no-fly area; none: a drift by the position error is too much";
 
-/// Altitudes of the relays, the positions that they choose with them, and the rank of the chain.
+/// Scenario with altitudes, the positions that relays choose in it, and the rank of this chain.
 struct Trial {
     scenario: Scenario,
     chain: Vec<Candidate>,
@@ -77,9 +77,9 @@ impl Trial {
     }
 }
 
-/// Returns the scenario with an altitude for each relay.
+/// Returns the scenario with an altitude for each relay, so that the chain is good over the terrain.
 ///
-/// The relays then choose good positions over the terrain. The search begins with the altitudes of `plan`, a plan over the terrain.
+/// The search begins with the altitudes of `plan`, a plan over the terrain.
 ///
 /// # Errors
 /// [`NoPlan`]: the relays find no positions, or the terrain is not covered.
@@ -138,7 +138,8 @@ pub fn with_altitudes(
             step_m *= 0.5;
         }
     }
-    // Relays that close a gap fly along the line at their altitudes: of altitudes with nearly the same SIR the highest are safest.
+    // A relay that closes a gap flies at its own altitude. Of altitudes with almost the same SIR, the highest is
+    // safest.
     let least = best.rank * (1.0 - SLACK);
     for relay in 0..plan.places.len() {
         for share in [1.0, 0.75, 0.5, 0.25] {
@@ -161,23 +162,23 @@ pub fn with_altitudes(
     Ok(best.scenario)
 }
 
-/// Position of a relay in flight, and its room: the interval of x in which it may move.
+/// Position of a relay in flight, and its room: an interval of x.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct FlownRelay {
     /// Number of the relay; 1 is next to Tx.
     pub index: u16,
-    /// Distance of its position from Tx along the line to Rx, m.
+    /// Distance of its position from Tx toward Rx, m.
     pub x_m: f32,
-    /// Altitude of its position above the line between the sites, m.
+    /// Altitude of its position above the straight line Tx-Rx, m.
     pub altitude_m: f32,
-    /// Interval of x, m, in which no hop gets worse while this relay's neighbours are in their intervals.
+    /// Room, m: interval of x in which no hop gets worse while the neighbours are in their rooms.
     ///
-    /// It contains no no-fly area. Absent if there is none.
+    /// It contains no no-fly area. Absent if there is no room.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub room_m: Option<[f64; 2]>,
 }
 
-/// Terrain below the chain after the loss of one relay, when the other relays have closed the gap.
+/// Chain over the terrain after the loss of one relay, when the other relays have closed the gap.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Without {
     /// Number of the lost relay.
@@ -185,20 +186,24 @@ pub struct Without {
     /// SIR of the worst hop with terrain, dB; absent if the other relays find no positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_sir_db: Option<f64>,
-    /// Problems in this chain: blocked hops; relays or paths that are too low or in a no-fly area. Absent if there are none.
+    /// Problems of this chain; absent if there are none.
+    ///
+    /// A hop is blocked, or a relay or its path is too low or in a no-fly area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
 
-/// Terrain below the positions that relays take by themselves, in a simulation of the flight.
+/// Simulated flight: the positions that the relays choose, and the terrain below them.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Flight {
-    /// SIR of the worst hop with terrain at these positions, dB.
+    /// SIR of the worst hop in the flight with terrain, dB.
     pub terrain_sir_db: f64,
-    /// Gain of the plan for the terrain over these positions, dB; absent if the plan has these positions.
+    /// SIR of the plan for the terrain minus the SIR of the flight, dB; absent without such a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_db: Option<f64>,
-    /// Largest distance of a relay from its position in the plan for the terrain, m. Absent if the plan has these positions.
+    /// Largest distance of a relay from its position in the plan for the terrain, m.
+    ///
+    /// Absent without such a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Positions of the relays.
@@ -206,12 +211,14 @@ pub struct Flight {
     /// Blocked hops that `--allow-blocked` accepts; absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blocked: Option<String>,
-    /// Reasons why relays have no room, one for each.
+    /// Reasons why relays have no room, one for each such relay.
     #[serde(skip)]
     confined: Vec<String>,
-    /// Chains after the loss of one relay; empty for one relay and for more than 50.
+    /// Chains after the loss of each relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
-    /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high. `None` if they can.
+    /// Reason why the relays cannot fly over this terrain; `None` if they can.
+    ///
+    /// A hop is blocked, or a relay is too low or too high.
     #[serde(skip)]
     pub problem: Option<String>,
 }
@@ -219,7 +226,7 @@ pub struct Flight {
 impl Flight {
     /// Simulates the flight over the terrain.
     ///
-    /// `flown` has the positions on which the relays of `scenario` agree by `method`.
+    /// `flown` has the positions that the relays of `scenario` agree on by `method`.
     ///
     /// # Errors
     /// [`NoPlan`]: the simulated relays do not agree on positions, or the terrain is not covered.
@@ -283,7 +290,7 @@ impl Flight {
         })
     }
 
-    /// Adds the differences from `plan`. `terrain_sir_db` is the SIR of its worst hop with terrain.
+    /// Adds the differences from `plan`, whose worst hop has the SIR `terrain_sir_db` with terrain.
     #[must_use]
     pub fn compared(self, plan: &Plan, terrain_sir_db: f64) -> Self {
         let apart = plan.places.iter().zip(&self.relays).map(|((from, _), to)| {
@@ -303,7 +310,7 @@ impl Flight {
             .then(|| format!("more than {MOST_RELAYS} relays"))
     }
 
-    /// Returns the lines about accepted blocked hops, relays without a room, and bad losses.
+    /// Returns warnings: accepted blocked hops, relays without a room, and problems after a loss.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let blocked = self.blocked.iter();
         let blocked = blocked.map(|line| format!("{line}; accepted by --allow-blocked"));
@@ -314,7 +321,7 @@ impl Flight {
         }))
     }
 
-    /// Returns the text about the interval of x of relay `index`; empty if the interval is unknown.
+    /// Returns the text about the room of relay `index`; empty if the relay is unknown.
     pub fn room(&self, index: u16) -> String {
         let relay = self.relays.iter().find(|relay| relay.index == index);
         match relay.map(|relay| relay.room_m) {
@@ -365,9 +372,10 @@ impl fmt::Display for Flight {
     }
 }
 
-/// Cuts `room` to its part around `place` that is outside of `no_fly`, within the position error.
+/// Cuts `room` to the part around `place` that is outside of all no-fly areas.
 ///
-/// Returns the reason why there is no room any more.
+/// The areas are enlarged by the position error `error_m`, m. Returns the reason if the relay is inside an area, and so
+/// has no room.
 fn cut(
     room: &mut Option<[f64; 2]>,
     place: &Placement,
@@ -393,7 +401,7 @@ fn cut(
     None
 }
 
-/// Returns the setup of a simulated flight on a shared channel without losses.
+/// Returns the setup of a simulated flight on a shared channel without frame losses.
 fn setup(
     scenario: &Scenario,
     relays: u16,
@@ -432,11 +440,11 @@ struct Loss {
     lost: u16,
     /// Numbers of the other relays.
     left: Vec<u16>,
-    /// Positions of the other relays; `None` if they find none.
+    /// Positions of the other relays; `None` if they agree on none.
     places: Option<Vec<Placement>>,
 }
 
-/// Simulates the flight of `relays` relays, and the loss of each of them.
+/// Simulates the flight of `relays` relays, and then the loss of each of them.
 ///
 /// Returns the positions before a loss, and the losses; none for a single relay.
 fn losses(
@@ -473,7 +481,7 @@ fn losses(
     Ok((places, losses.into_iter().collect::<Result<_, _>>()?))
 }
 
-/// Reason for the user why nothing is known after the loss of a relay.
+/// Text for the user if the other relays agree on no positions after a loss.
 const NOWHERE: &str = "the other relays find no positions";
 
 /// Returns a warning for each relay whose loss leads another relay into a no-fly area.
@@ -499,9 +507,9 @@ pub fn no_fly_warnings(
     Ok(lines_of(&scenario.no_fly, &losses, &places))
 }
 
-/// Returns a line for each loss that leads another relay into a no-fly area.
+/// Returns a text for each loss that leads another relay into a no-fly area.
 ///
-/// The chain is at `places` before.
+/// `places` are the positions before the loss.
 fn lines_of(no_fly: &[NoFly], losses: &[Loss], places: &[Placement]) -> Vec<String> {
     let lines = losses.iter().filter_map(|loss| {
         let problems = match &loss.places {
@@ -515,14 +523,16 @@ fn lines_of(no_fly: &[NoFly], losses: &[Loss], places: &[Placement]) -> Vec<Stri
 }
 
 impl Loss {
-    /// Returns the positions of the other relays before the loss. `places` are the positions of all relays.
+    /// Returns the positions of the other relays before the loss. `places` has all relays.
     fn before(&self, places: &[Placement]) -> Vec<Placement> {
         let left = (1..).zip(places).filter(|(index, _)| *index != self.lost);
         left.map(|(_, place)| *place).collect()
     }
 }
 
-/// Returns terrain and no-fly areas below the others, after each of the losses in a chain at `places`.
+/// Checks terrain and no-fly areas below the other relays after each loss.
+///
+/// `places` are the positions before the loss.
 fn losses_over(
     scenario: &Scenario,
     elevation: &Elevation,
@@ -535,7 +545,9 @@ fn losses_over(
     without.into_iter().collect()
 }
 
-/// Returns terrain and no-fly areas below the others, after a loss in a chain at `places`.
+/// Checks terrain and no-fly areas below the other relays after one loss.
+///
+/// `places` are the positions before the loss.
 fn without(
     scenario: &Scenario,
     elevation: &Elevation,
@@ -588,9 +600,9 @@ fn without(
     })
 }
 
-/// Returns the x and the height above the ground, m, of the lowest point of a straight path.
+/// Returns the x and the height above the ground, m, of the point of a path closest to the ground.
 ///
-/// The lowest point is the point closest to the ground. `None` if the ends are the same.
+/// The path is straight. `None` if its ends are the same.
 fn lowest(ground: &Ground<'_>, from: Placement, to: Placement) -> Result<Option<[f64; 2]>, String> {
     let [start, end] = [ground.relay(from)?, ground.relay(to)?];
     if start == end {
@@ -621,9 +633,9 @@ mod tests {
     use super::{Flight, Loss, NOWHERE, losses_over};
     use crate::plan::terrain::Elevation;
 
-    /// Checks what a user reads if the others find no positions after a loss.
+    /// Checks the text for the user if the other relays agree on no positions after a loss.
     ///
-    /// The simulated relays of a scenario file always find some, so the outcome is given here.
+    /// Simulated relays always agree on some, so the outcome is given here.
     #[test]
     fn a_loss_after_which_the_others_find_no_positions_is_named() {
         let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/hills.toml");

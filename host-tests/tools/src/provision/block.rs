@@ -21,13 +21,13 @@ use super::config::{
 pub enum BlockError {
     /// Error: the scenario is not a valid mission, for this reason.
     Refused(Refusal),
-    /// Error: the scenario states the interference at this many positions, too many for a block.
+    /// Error: the interference has this many points, too many for a block.
     Points(usize),
     /// Error: the drone would reject the configuration, for this reason.
     Config(ConfigError),
     /// Error: the drone would reject the surveyed positions of Tx and Rx, for this reason.
     Course(CourseError),
-    /// Error: the drone would read from the block another configuration than the intended configuration.
+    /// Error: a drone would read another configuration from the block.
     Changed,
 }
 
@@ -89,7 +89,7 @@ impl fmt::Display for BlockError {
 
 impl std::error::Error for BlockError {}
 
-/// Configuration of all drones of one flight, from which the block of each is built.
+/// Configuration of all drones of a flight. It builds the block of each drone.
 #[derive(Clone, Debug)]
 pub struct Flight {
     mission: Mission,
@@ -103,14 +103,14 @@ pub struct Flight {
     sites: Option<Sites>,
     autopilot_key: Option<[u8; 32]>,
     network: u16,
-    /// Silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
+    /// Silence of a neighbour after which a relay probes it, ms; 0 selects the firmware's default.
     probe_after_ms: u32,
 }
 
 impl Flight {
     /// Creates the configuration of `uavs` relays in `scenario`, with the network number `network`.
     ///
-    /// The method is `align`, without measurements. `tolerance` is the relative tolerance on the achieved SIR.
+    /// The method is `align`, without measurements. `tolerance` is the relative tolerance of the SIR.
     ///
     /// # Errors
     /// [`BlockError`] if the scenario is not a valid mission, or does not fit into a block.
@@ -146,12 +146,12 @@ impl Flight {
         })
     }
 
-    /// Sets the method by which the relays choose their positions.
+    /// Sets the placement method of the relays.
     pub fn by(self, method: Method) -> Self {
         Self { method, ..self }
     }
 
-    /// Sets the time slots of the relays as `scenario` describes them, if their method is the joint method.
+    /// Sets the time slots as `scenario` describes them, if the method is the joint method.
     ///
     /// # Errors
     /// [`BlockError::Refused`] if the relays cannot use slots that are as long as each hop needs.
@@ -168,7 +168,7 @@ impl Flight {
         Self { measure, ..self }
     }
 
-    /// Sets the silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
+    /// Sets the silence of a neighbour after which a relay probes it, ms; 0 selects the firmware's default.
     pub fn with_probe_after(self, probe_after_ms: u32) -> Self {
         Self {
             probe_after_ms,
@@ -176,13 +176,14 @@ impl Flight {
         }
     }
 
-    /// Sets the key and epoch with which the relays sign their frames; `None` for unsigned frames.
+    /// Sets the key and epoch for signing frames; `None` for unsigned frames.
     pub fn signed(self, secret: Option<Secret>) -> Self {
         Self { secret, ..self }
     }
 
-    /// Sets the drones' greatest speed, m/s. It has no effect if the scenario lacks geographic positions of Tx and
-    /// Rx.
+    /// Sets the drones' greatest speed, m/s.
+    ///
+    /// It has no effect if the scenario lacks geographic positions of Tx and Rx.
     pub fn no_faster_than(mut self, speed_m_s: f32) -> Self {
         if let Some(sites) = &mut self.sites {
             sites.speed_m_s = speed_m_s;
@@ -200,7 +201,7 @@ impl Flight {
 
     /// Returns true if the scenario has the geographic positions of Tx and Rx.
     ///
-    /// An autopilot needs these, because its setpoints are latitudes and longitudes.
+    /// An autopilot needs them, because its setpoints are latitudes and longitudes.
     pub const fn has_sites(&self) -> bool {
         self.sites.is_some()
     }
@@ -210,9 +211,7 @@ impl Flight {
         &self.mission
     }
 
-    /// Returns the relays' own profiles (power, altitude) with their indices, from 1.
-    ///
-    /// Only relays whose profile differs from the common profile are listed.
+    /// Returns the profiles (power, altitude) of relays that differ from the common one, by index from 1.
     pub fn profiles(&self) -> &[(u16, Profile)] {
         &self.own
     }
@@ -222,7 +221,7 @@ impl Flight {
         &self.held
     }
 
-    /// Returns the method by which the relays choose their positions.
+    /// Returns the placement method of the relays.
     pub const fn method(&self) -> Method {
         self.method
     }
@@ -268,7 +267,7 @@ impl Flight {
     }
 }
 
-/// Converts a scenario's channel, with losses in dB, to the numbers of a block, with factors.
+/// Converts a scenario's channel, with losses in dB, to the factors of a block.
 ///
 /// The result equals [`uav_relay::Channel::from_db`] to the bit.
 fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
@@ -285,7 +284,7 @@ fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     }
 }
 
-/// Returns the silences after which a neighbour is probed and after which it counts as lost.
+/// Returns the silence of a neighbour after which it is probed, and that after which it counts as lost.
 ///
 /// 0 selects the firmware's default.
 pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
@@ -296,13 +295,13 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     [settings.probe_after, settings.dead_after]
 }
 
-/// Returns the silence, ms, after which a relay with this block probes a neighbour.
+/// Returns the silence of a neighbour, ms, after which a relay with this block probes it.
 ///
-/// The silence is `given_ms` from the command line, otherwise the value of the scenario's section `network`; 0
-/// selects the firmware's default. `name` is the name of the scenario, for errors.
+/// It is `given_ms` from the command line, or else the value in the scenario's section `network`; 0 selects the
+/// firmware's default. `name` is the name of the scenario, for errors.
 ///
 /// # Errors
-/// A line that names a key whose value no block can express, the value and the allowed one.
+/// A text with the key whose value no block can have, that value, and the allowed one.
 pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> Result<u32, String> {
     let refuse = |key: &str, value: u32, own: u32, why: &str| {
         format!(
@@ -334,7 +333,7 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
         let why = "the firmware always uses three times probe_after_ms as dead_after_ms";
         return Err(refuse("dead_after_ms", after, dead, why));
     }
-    // The explicit default and 0 give the same block.
+    // 0 is used for the default, so that both give the same block.
     let [usual, _] = silence(0);
     let is_usual = Duration::from_millis(probe_after_ms.into()) == usual;
     Ok(if is_usual { 0 } else { probe_after_ms })

@@ -13,10 +13,10 @@ use uav_relay_scenario::deployment::Deployment;
 
 use crate::plan::terrain_flight::{Flight, ROOM};
 
-/// Text in a udev rule that the operator replaces by the serial number of an adapter.
+/// Text in a udev rule that the operator replaces with the serial number of an adapter.
 pub const FILL_IN: &str = "FILL-IN-SERIAL-NUMBER";
 
-/// Beginning of the port names in `/dev` that the udev rules of a bundle create.
+/// Start of the port names in `/dev` that the udev rules of a bundle create.
 const LINK: &str = "uav-relay-";
 
 const RELAY_UNIT: &str = include_str!("../../../../examples/linux_companion/uav-relay@.service");
@@ -24,46 +24,47 @@ const RELAY_UNIT: &str = include_str!("../../../../examples/linux_companion/uav-
 /// Folders in which the systemd units of relay and ground station may write.
 const WRITABLE: [&str; 2] = ["/var/lib/uav-relay", "/run/uav-relay"];
 
-/// Largest MAVLink system number of a drone; ground stations have the next numbers.
+/// Largest MAVLink system number of a drone. Ground stations have the next numbers.
 const MAX_SYSTEM: u16 = 250;
 
-/// Distance beside the relays' range of y within which drones take off, m.
+/// Largest lateral distance of a take-off from the chain, m.
 pub const ASIDE_M: f64 = 50.0;
 
 /// Largest radius and altitude of ArduCopter's fences, m.
 const FENCE_RADIUS_M: f64 = 10_000.0;
 const FENCE_ALT_M: f64 = 1_000.0;
 
-/// Type of an integer parameter in a PX4 parameter file, `MAV_PARAM_TYPE_INT32`.
+/// PX4 type of an integer parameter, `MAV_PARAM_TYPE_INT32`.
 const INT: u8 = 6;
 
-/// Type of a parameter with decimals in a PX4 parameter file, `MAV_PARAM_TYPE_REAL32`.
+/// PX4 type of a parameter with decimals, `MAV_PARAM_TYPE_REAL32`.
 const FLOAT: u8 = 9;
 
-/// Flight for which a bundle is made.
+/// Data of the flight that a bundle is made for.
 #[derive(Debug)]
 pub struct Bundle<'a> {
     /// Text of the scenario file, with a plan if the positions of the relays are known.
     pub text: String,
-    /// Sections of the scenario file that set up the programs on the computers.
+    /// Sections `[network]`, `[companion]` and `[ground]` of the scenario file.
     pub deployment: &'a Deployment,
     /// Number of relays.
     pub uavs: u16,
     /// Network number of the relays.
     pub network: u16,
-    /// Method by which the relays choose their positions.
+    /// Placement method of the relays.
     pub method: &'a str,
     /// Mission that the relays load.
     pub mission: &'a Mission,
     /// Profiles of the relays that differ from the mission's.
     pub profiles: &'a [(u16, Profile)],
-    /// Positions on which the relays will settle; empty if unknown.
+    /// Positions that the relays will agree on; empty if unknown.
     pub places: &'a [(Placement, Profile)],
     /// Simulated flight over the terrain; `None` without terrain.
     pub simulated: Option<&'a Flight>,
-    /// Lowest and highest ground, m above the sea, if there is a terrain.
+    /// Lowest and highest ground, m above the sea; `None` without terrain.
     ///
-    /// It counts up to [`ASIDE_M`] beside the flight. The highest ground includes the least height above the ground.
+    /// It is the ground up to [`ASIDE_M`] beside the chain. The highest value includes the smallest permitted height of
+    /// relays above the ground.
     pub ground_m: Option<[f64; 2]>,
     /// Line from Tx to Rx.
     pub line: &'a Line,
@@ -76,16 +77,16 @@ pub struct Bundle<'a> {
 /// File of a bundle: name, mode, content.
 type Content = (&'static str, u32, String);
 
-/// Autopilot parameter: names and values in PX4 and in ArduCopter, where they exist, and PX4 type.
+/// Autopilot parameter: name, type and value in PX4; name and value in ArduCopter. Each may be absent.
 type Parameter = (Option<(&'static str, u8, f64)>, Option<(&'static str, f64)>);
 
 impl Bundle<'_> {
     /// Writes the folders of the relays `relays` and of the ground station into the new folder `dir`.
     ///
-    /// All files are written into a temporary folder beside `dir`, which is renamed at the end.
+    /// All files are first written into a temporary folder beside `dir`, which is renamed at the end.
     ///
     /// # Errors
-    /// A line that names the folder or file and the reason. `dir` then does not exist.
+    /// A text that names the folder or file and the reason. `dir` then does not exist.
     pub fn write(&self, dir: &Path, relays: &[u16]) -> Result<(), String> {
         let named = |at: &Path, error: &dyn std::fmt::Display| {
             format!("--bundle {}: {error}", at.display())
@@ -120,7 +121,7 @@ impl Bundle<'_> {
             }
             sync(&folder).map_err(|error| named(&dir.join(&name), &error))?;
         }
-        // Other users of this computer see the names of the files, not the keys.
+        // Other users of this computer can see the names of the files, but cannot read the keys.
         std::fs::set_permissions(staged.path(), Permissions::from_mode(0o755))
             .and_then(|()| sync(staged.path()))
             .and_then(|()| std::fs::rename(staged.path(), dir))
@@ -157,7 +158,7 @@ impl Bundle<'_> {
         if own.upstream.is_some() || own.downstream.is_some() {
             ports = vec!["upstream", "downstream"];
         }
-        // At an end of the chain the second wire leads to the ground station, or nowhere.
+        // At an end of the chain one port leads to the ground station, or nowhere.
         let at_rx = self.deployment.ground.end.as_deref() == Some("rx");
         let ends = [
             ("upstream", index == 1 && at_rx),
@@ -277,13 +278,13 @@ impl Bundle<'_> {
         Ok(files)
     }
 
-    /// Returns the scenario file with the section `[network]` of this flight, and without the terrain.
+    /// Returns the scenario file with the section `[network]` of this flight, and without terrain.
     fn document(&self) -> Result<DocumentMut, String> {
         let mut file: DocumentMut = self
             .text
             .parse()
             .map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
-        // Only the planner reads the elevation files and no-fly areas, whose files are not in the bundle.
+        // Only the planner reads elevation files and no-fly areas. Their files are not in the bundle.
         for section in ["terrain", "no_fly"] {
             _ = file.remove(section);
         }
@@ -302,14 +303,14 @@ impl Bundle<'_> {
         GuardConfig::of(self.mission, profile).geofence
     }
 
-    /// Returns the altitude above home at which relay `index` returns, m.
+    /// Returns the altitude above home at which relay `index` returns to launch, m.
     ///
-    /// Drones return at different altitudes, because a returning drone crosses the line of the others. All are above the
+    /// The altitudes of two drones differ, because a returning drone crosses the paths of others. All are above the
     /// chain and, if there is a terrain, above the ground between Tx and Rx.
     fn return_m(&self, index: u16) -> f64 {
         let [tx, rx] = self.line.sites.map(|site| f64::from(site.amsl_mm) / 1e3);
         let highest = (1..=self.uavs).map(|of| f64::from(self.fence(of).most_altitude_m));
-        // Altitudes are above the line between the sites, those of an autopilot above its home.
+        // A fence altitude is above the line from Tx to Rx. An autopilot's altitude is above its home.
         let highest_m = tx.max(rx) + highest.fold(20.0, f64::max);
         let [low, high] = self.ground_m.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
         let top_m = highest_m.max(high) - tx.min(rx).min(low);
@@ -318,7 +319,7 @@ impl Bundle<'_> {
         (top_m + 10.0).ceil() + step_m * f64::from(index - 1)
     }
 
-    /// Returns the parameters that the chain needs in the autopilot of relay `index`.
+    /// Returns the parameters that the autopilot of relay `index` needs.
     ///
     /// # Errors
     /// The highest altitude is above the range of a fence.
@@ -327,7 +328,7 @@ impl Bundle<'_> {
         let fence = self.fence(index);
         let return_m = |index: u16| self.return_m(index);
         let wide_m = f64::from(fence.most_y_m.max(-fence.least_y_m));
-        // A drone takes off near its place, so that the largest radius contains its flight.
+        // Drones take off near the chain, so that this radius contains the flight.
         let radius_m = (f64::from(config.distance_m) + wide_m + 200.0).ceil();
         let radius_m = radius_m.min(FENCE_RADIUS_M);
         let ceiling_m = return_m(self.uavs) + 20.0;
@@ -346,7 +347,7 @@ impl Bundle<'_> {
         let ardupilot = |name, value| (None, Some((name, value)));
         Ok(vec![
             (Some(("MAV_SYS_ID", INT, own)), Some(("SYSID_THISMAV", own))),
-            // The names from ArduCopter 4.7 on: an autopilot knows one of the two.
+            // Names from ArduCopter 4.7 on. An autopilot knows either the old or the new names.
             ardupilot("MAV_SYSID", own),
             ardupilot("RTL_ALT_M", return_m(index)),
             // TELEM 2, messages for an onboard computer.
@@ -358,7 +359,8 @@ impl Bundle<'_> {
             ),
             ardupilot("SERIAL2_PROTOCOL", 2.0),
             ardupilot("BRD_SER2_RTSCTS", 0.0),
-            // Hold when the companion is silent for 1 s; no failsafe in OFFBOARD when the remote control is lost.
+            // The autopilot holds when the companion is silent for 1 s. Loss of the remote control is no failure in
+            // OFFBOARD.
             px4("COM_OF_LOSS_T", FLOAT, 1.0),
             px4("COM_OBL_RC_ACT", INT, 5.0),
             px4("COM_RCL_EXCEPT", INT, 4.0),
@@ -366,12 +368,13 @@ impl Bundle<'_> {
                 Some(("RTL_RETURN_ALT", FLOAT, return_m(index))),
                 Some(("RTL_ALT", 100.0 * return_m(index))),
             ),
-            // A drone that is engaged goes on without its remote control. The 16 is ArduCopter's default.
+            // A drone under the companion's control continues without its remote control. The 16 is ArduCopter's
+            // default.
             ardupilot("FS_OPTIONS", 20.0),
-            // Near home, too, a drone first climbs to its own altitude.
+            // A drone also climbs to its return altitude near home.
             px4("RTL_CONE_ANG", INT, 0.0),
             ardupilot("RTL_CONE_SLOPE", 0.0),
-            // Hold, or brake, at a fence around home that contains the flight.
+            // At the fence the autopilot holds, or brakes. The fence is around home, and contains the flight.
             (Some(("GF_ACTION", INT, 2.0)), Some(("FENCE_ACTION", 4.0))),
             ardupilot("FENCE_ENABLE", 1.0),
             ardupilot("FENCE_TYPE", 3.0),
@@ -479,11 +482,11 @@ impl Bundle<'_> {
     }
 }
 
-/// Returns the section `name` of a file. A missing section is added.
+/// Returns the section `name` of a file. Adds a missing section.
 fn section<'a>(file: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
     let new = || Item::Table(Table::new());
     let item = file.entry(name).or_insert_with(new);
-    // The scenario was read before, so that its sections are tables.
+    // The scenario has been read before, so that its sections are tables.
     item.as_table_like_mut()
         .ok_or_else(|| format!("{name} is not a section"))
 }
@@ -494,9 +497,9 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
     }
 }
 
-/// Moves the relative paths in the entries `keys` into the folder in which the unit may write.
+/// Moves the relative paths of `keys` into the folder that the systemd unit may write to.
 ///
-/// The entries name files that the program writes. A missing entry stays missing.
+/// The keys name files that the program writes. A missing key stays missing.
 ///
 /// # Errors
 /// An absolute path is in another folder.
@@ -522,7 +525,7 @@ fn written_files(section: &mut dyn TableLike, name: &str, keys: &[&str]) -> Resu
     Ok(())
 }
 
-/// Refuses relative paths of files that are not in the bundle.
+/// Rejects relative paths of files that are not in the bundle.
 ///
 /// # Errors
 /// The key and its path.
@@ -538,17 +541,17 @@ fn absolute(section: &dyn TableLike, name: &str, keys: &[&str]) -> Result<(), St
     Ok(())
 }
 
-/// Moves a relative path of a written file into the folder in which the unit may write.
+/// Moves a relative path into the folder that the systemd unit may write to.
 fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
     let given = section.get(key).and_then(Item::as_str).unwrap_or(name);
     let path = Path::new("/var/lib/uav-relay").join(given);
     section.insert(key, value(path.display().to_string()));
 }
 
-/// Returns the udev rules for the ports `ports` whose names begin with [`LINK`]. Other ports need no rule.
+/// Returns the udev rules for those of `ports` whose names begin with [`LINK`]. Other ports need none.
 ///
 /// # Errors
-/// A name of a port has other characters than letters, digits, `.`, `_` and `-`: in a rule they could be a command.
+/// A port name has other characters than letters, digits, `.`, `_` and `-`: in a rule they could be a command.
 fn rules(section: &dyn TableLike, ports: &[&str]) -> Result<String, String> {
     let paths = ports.iter().filter_map(|port| section.get(port)?.as_str());
     let links: Vec<&str> = paths

@@ -15,14 +15,14 @@ pub fn name(index: u16) -> String {
     format!("relay{index}.bin")
 }
 
-/// Writes `files`, each with its name and content, to the folder `dir`. Creates `dir` if necessary.
+/// Writes `files`, each a name and content, to the folder `dir`. Creates `dir` if necessary.
 ///
-/// With `force`, the function overwrites existing files. It also removes all other configuration blocks from the
-/// folder, because these blocks belong to another flight and a drone would accept them. The function first writes
-/// temporary files and renames them at the end. If it fails before that, the folder is unchanged.
+/// With `force`, existing files are overwritten. All other configuration blocks in the folder are removed, because a
+/// drone would accept such a block of another flight. Temporary files are written first, and renamed at the end. If an
+/// error occurs before, the folder is unchanged.
 ///
 /// # Errors
-/// A line that names the file or folder and the reason.
+/// A text that names the file or folder and the reason.
 pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(), String> {
     let old = there(dir, files)?;
     if let Some(first) = old.first()
@@ -37,7 +37,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
     let is_new = !dir.exists();
     let failed = |what: &Path, error: std::io::Error| {
         if is_new {
-            // Removes the folder again, if it was created.
+            // Removes the folder, if it was created here.
             _ = std::fs::remove_dir(dir);
         }
         format!("--out-dir {}: {error}", what.display())
@@ -74,7 +74,7 @@ fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     Ok(file)
 }
 
-/// Returns the paths of the files in `dir` that are blocks of any relay, or have a name in `files`.
+/// Returns the paths of the files in `dir` that are configuration blocks, or have a name in `files`.
 fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String> {
     if !dir.exists() {
         return Ok(Vec::new());
@@ -98,16 +98,16 @@ fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String
     Ok(there)
 }
 
-/// Data of a flight that its `summary.txt` begins with.
+/// Data at the beginning of a flight's `summary.txt`.
 #[derive(Clone, Debug)]
 pub struct Heading {
     /// Name of the scenario.
     pub scenario: String,
-    /// Number of relays in the provisioned chain.
+    /// Number of relays in the chain.
     pub uavs: u16,
     /// Network number of the relays.
     pub network: u16,
-    /// Method by which the relays choose their positions, as named on the command line.
+    /// Placement method of the relays, as named on the command line.
     pub method: String,
     /// True if the relays sign their frames.
     pub signed: bool,
@@ -115,7 +115,7 @@ pub struct Heading {
 
 /// Returns the text of `summary.txt`: the flight, the expected positions, the commands for flashing.
 ///
-/// `places` are the positions on which the relays settle, empty if unknown. `line` converts them to latitude and
+/// `places` are the positions that the relays agree on; empty if unknown. `line` converts them to latitude and
 /// longitude.
 pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<&Line>) -> String {
     let Heading {

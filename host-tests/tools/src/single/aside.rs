@@ -16,9 +16,9 @@
 //! 1. Above Rx, where SIR_2 is maximal, if SIR_1 is no worse there.
 //! 2. At the maximum of SIR_1, its only one, if SIR_2 is no worse there: t = 2 h^2 / (sqrt(q) + sqrt(q + 4 h^2)) from Tx,
 //!    straight away from the interferer.
-//! 3. Otherwise where two level circles touch with disjoint insides and SIR_1 = SIR_2. No other position is as good, because two
-//!    such sets share only the touching point. This holds for two discs (k > 0), and for the disc of SIR_2 within the disc that
-//!    SIR_1 excludes (k < 0).
+//! 3. Otherwise where a circle of constant SIR_1 touches one of constant SIR_2, with SIR_1 = SIR_2. No other position
+//!    is as good, because the two sets of positions with higher SIRs share only the touching point. This holds for two
+//!    discs (k > 0), and for the disc of SIR_2 within the disc that SIR_1 excludes (k < 0).
 //!
 //! Any other position can be improved: either one SIR is worse and can rise, or both can rise together.
 //!
@@ -82,34 +82,40 @@ pub use super::edge::EdgeCoordinate;
 /// Number of bisection steps in f64; the remaining error is far below a step of an f32.
 const HALVINGS: u8 = 48;
 
-/// Geometric case of the optimal position of a single relay that may move sideways.
+/// Case of the optimal position of a single relay that may move sideways.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum AsideCase {
     /// Optimum at the lowest altitude, where the circles of constant SIR of both hops touch.
     Touching,
-    /// Optimum at the lowest altitude, where the first hop's SIR is at its maximum. The second hop's SIR is higher
-    /// there.
+    /// Optimum at the lowest altitude, at the maximum of the first hop's SIR.
+    ///
+    /// The second hop's SIR is higher there.
     Hilltop,
-    /// Optimum above Rx, at the lowest altitude. The first hop's SIR is higher than the second hop's SIR there.
+    /// Optimum above Rx, at the lowest altitude. The first hop's SIR is higher there than the second hop's.
     AboveRx,
-    /// Optimum on an edge of the box of allowed positions, along this coordinate. Without the limits of the box the
-    /// optimum would be elsewhere.
+    /// Optimum on an edge of the box of allowed positions, along this coordinate.
+    ///
+    /// Without the limits of the box the optimum would be elsewhere.
     Edge(EdgeCoordinate),
     /// Optimum above Rx: the interferer is at Tx (X = Y = 0), so the SIR of the first hop is constant.
     Level,
-    /// Optimum on a vertical face of the box of allowed positions, with noise. The curves of constant SIR of the two
-    /// hops touch there.
+    /// Optimum on a vertical face of the box of allowed positions; only with noise.
+    ///
+    /// The curves of constant SIR of the two hops touch there.
     Wall,
-    /// Optimum at the lowest or highest altitude, inside the allowed lateral range; only with noise. A search has
-    /// found this optimum; it is not proven.
+    /// Optimum at the lowest or highest altitude, inside the allowed lateral range; only with noise.
+    ///
+    /// It is found by a search, and not proven.
     Inside,
     /// Optimum above Rx: the interferer is at Rx (X = D, Y = 0), so the second hop's SIR is always 0.
     Drowned,
 }
 
 impl AsideCase {
-    /// Number of the case, 1 to 10. Cases 1 to 3 are optima without limits; 4 to 6 are optima on edges along x, y and
-    /// h. In cases 7 and 8 the interferer is at Tx or Rx. Cases 9 and 10 occur only with noise.
+    /// Number of the case, 1 to 10.
+    ///
+    /// Cases 1 to 3 are optima without limits; 4 to 6 are optima on edges along x, y and h. In cases 7 and 8 the
+    /// interferer is at Tx or Rx. Cases 9 and 10 occur only with noise.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -124,20 +130,20 @@ impl AsideCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The x is between Tx and Rx, and y
-/// in the allowed lateral range.
+/// Returns the optimal position of a relay with `profile`, and its case; `None` in a field.
 ///
-/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64; with noise 48 further steps for each of them. If the
-/// optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
+/// x is between Tx and Rx, and y in the allowed lateral range. The relay has the altitude of `profile`. Work: 48
+/// bisection steps in f64; with noise 48 further steps for each of them. If the optimum without limits is not allowed,
+/// some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The x is between Tx and Rx; y
-/// and altitude are in their allowed ranges.
+/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field.
 ///
-/// Work: 48 bisection steps in f64; with noise 48 further steps for each of them. If the optimum without limits is not allowed, some 800
-/// evaluations of both hops; with noise and a lateral range some 46 000 more.
+/// x is between Tx and Rx; y and altitude are in their allowed ranges. Work: 48 bisection steps in f64; with noise 48
+/// further steps for each of them. If the optimum without limits is not allowed, some 800 evaluations of both hops;
+/// with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }
@@ -157,7 +163,7 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
     if holds(along, place.x_m) && holds(across, place.y_m) {
         return Some((hops.found(place), case));
     }
-    // The position above Rx is always within.
+    // The position above Rx is always allowed.
     let above_rx = Placement::on_line(config.distance_m, band.least_m);
     let mut best = (hops.found(above_rx), AsideCase::AboveRx);
     let at = |x_m: f32, y_m: f32, altitude_m: f32| Placement {
@@ -242,9 +248,10 @@ fn without_limits(
     (place, case)
 }
 
-/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs at a point. The numbers are D
-/// (distance Tx-Rx), the interferer's position (X, Y), h^2, the ratio G = K / A of the hops' gains, and the noise nu,
-/// in m and m^2.
+/// Horizontal plane at one altitude h, with the numbers that both hops' SIRs depend on.
+///
+/// The numbers are D (distance Tx-Rx), the interferer's position (X, Y), h^2, the ratio G = K / A of the hops' gains,
+/// and the noise nu, in m and m^2.
 struct Plane {
     d: f64,
     x: f64,
@@ -284,8 +291,10 @@ impl Plane {
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// Returns the factor t for the position -t (X, Y) at which the first hop has its largest SIR. The interferer is
-    /// at (X, Y), and Tx at (0, 0), so the position is opposite the interferer as seen from Tx. `q` is X^2 + Y^2.
+    /// Returns the factor t of the position -t (X, Y) with the first hop's largest SIR.
+    ///
+    /// The interferer is at (X, Y), and Tx at (0, 0). As seen from Tx, the position is opposite the interferer. `q` is
+    /// X^2 + Y^2.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {
@@ -302,11 +311,12 @@ impl Plane {
         bisected(0.0, t, HALVINGS, rises).0
     }
 
-    /// Returns the point on a circle about Rx at which the first hop has its largest SIR, with noise. The point is (x, y), m. `s` is the
-    /// radius of the circle, m.
+    /// Returns the point on a circle about Rx with the first hop's largest SIR, with noise: (x, y), m.
+    ///
+    /// `s` is the radius of the circle, m.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
         let at = |w: f64| (self.d - s * libm::cos(w), s * libm::sin(w));
-        // From the point closest to Tx, at 0, to that farthest from the interferer.
+        // From the point closest to Tx, w = 0, to the point farthest from the interferer.
         let mut far = libm::atan2(-self.y, self.x - self.d);
         if !(squared(self.x) + squared(self.y) > 0.0) {
             far = 0.0;
@@ -323,13 +333,14 @@ impl Plane {
         at(bisected(0.0, 1.0, HALVINGS, rises).0 * far)
     }
 
-    /// Returns the second hop's SIR divided by the first hop's gain A. `s` is the relay's distance from Rx along the
-    /// ground, m.
+    /// Returns the second hop's SIR divided by the first hop's gain A.
+    ///
+    /// `s` is the relay's distance from Rx along the ground, m.
     fn second(&self, s: f64) -> f64 {
         self.g / (squared(s) + self.h2)
     }
 
-    /// Returns the point on the circle of radius `s` about Rx at which the first hop has its largest SIR.
+    /// Returns the point on the circle of radius `s` about Rx with the first hop's largest SIR.
     fn loudest(&self, s: f64) -> (f64, f64) {
         if self.noise > 0.0 {
             return self.loudest_in_noise(s);

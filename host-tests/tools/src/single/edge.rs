@@ -1,13 +1,15 @@
-//! Edges and faces of the box of a single relay. Best position on an edge, and with noise inside a face.
+//! Edges and faces of the box of a single relay's allowed positions.
+//!
+//! This module finds the best position on an edge, and with noise inside a face.
 //!
 //! # Edge
 //!
-//! One of x, y and altitude is free, the other two are fixed.
+//! One of x, y and altitude is free. The other two are fixed.
 //!
-//! With t the free coordinate, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 has one extremum, at
-//! E. SIR_1 has extrema where P t^2 - (P^2 + a - b) t - P b = 0, at two points whose product is -b. Between these three points
-//! both are monotone, so the worse one is maximal at an end of such an interval, or where they cross, which is at one point. With
-//! noise SIR_1 may have three extrema.
+//! With t the free coordinate, SIR_1 = A ((t - P)^2 + a) / (t^2 + b) and SIR_2 = K / ((t - E)^2 + d). SIR_2 has one
+//! extremum, at E. SIR_1 has extrema where P t^2 - (P^2 + a - b) t - P b = 0, at two points whose product is -b.
+//! Between these three points both are monotone. The worse SIR is therefore largest at an end of such an interval, or
+//! at the one point where they cross. With noise SIR_1 may have three extrema.
 //!
 //! | free | P | a | b | E |
 //! | --- | --- | --- | --- | --- |
@@ -30,12 +32,14 @@
 //!
 //! # Corridor at one altitude
 //!
-//! With lateral freedom and noise the corridor is searched at one altitude, if the touching position is outside.
+//! If the touching position is outside of the corridor, a relay with lateral freedom and noise is placed by a search at
+//! one altitude.
 //!
-//! Without noise no position inside the rectangle can then be optimal. With noise there may be a second position at which two
-//! level lines touch from within, on the other side of the interferer's line; near Y = 0 it is almost the mirror image of the
-//! first. There is no proof of their number, so the plane is searched. Each line along x is solved exactly, as an edge. The best
-//! line is searched on lines that are closer near y = 0, and by golden section about the three best.
+//! Without noise no position inside the rectangle can then be optimal. With noise there may be a second position at
+//! which two level lines touch from within, on the other side of the interferer's line; near Y = 0 it is almost the
+//! mirror image of the first. Their number is not proven, so the plane is searched. The best x for each y is computed
+//! exactly, as on an edge. The best y is searched on values that are closer near y = 0, and by golden section around
+//! the three best.
 //!
 //! # Touching position in a vertical plane
 //!
@@ -77,14 +81,15 @@ use super::{Found, HALVINGS, TwoHops};
 pub enum EdgeCoordinate {
     /// Position varies from Tx toward Rx: edge along x.
     Along = 4,
-    /// Position varies across the line Tx to Rx: edge along y.
+    /// Lateral position varies: edge along y.
     Across = 5,
     /// Vertical edge: the altitude varies.
     Upward = 6,
 }
 
-/// Edge of the box in which a relay may be. On this edge the coordinate `free` varies within `room`, m. The other two
-/// coordinates are constant, as in the point `through`.
+/// Edge of the box of a relay's allowed positions.
+///
+/// The coordinate `free` varies within `room`, m. The other two coordinates are those of the point `through`.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
     pub(super) free: EdgeCoordinate,
@@ -103,8 +108,9 @@ impl Edge {
         place
     }
 
-    /// Returns the extrema of both hops' SIRs along the edge, as values of the varying coordinate, m. An extremum
-    /// that does not exist is NaN, or far away.
+    /// Returns the extrema of both hops' SIRs along the edge, as values of the varying coordinate, m.
+    ///
+    /// An extremum that does not exist is NaN, or far away.
     fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
         let at = self.through;
@@ -141,8 +147,8 @@ impl Edge {
 
     /// Returns the position on the edge with the best SIR of the worse hop.
     ///
-    /// Work: at most 16 evaluations of both hops, and 42 more for each interval on which one SIR rises, the other
-    /// falls, and they cross: without noise one such interval for x and for the altitude, two for y.
+    /// Work: at most 16 evaluations of both hops, and 42 more for each interval with a crossing of the two SIRs.
+    /// Without noise there is one such interval for x and for the altitude, and two for y.
     pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,
@@ -161,8 +167,9 @@ impl Edge {
         best
     }
 
-    /// Returns the best position on the edge above `low` and up to `high`, m. Each hop's SIR must only rise or only
-    /// fall between the two.
+    /// Returns the best position on the edge above `low` and up to `high`, m.
+    ///
+    /// Each hop's SIR must only rise or only fall between the two.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -188,21 +195,21 @@ fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Returns the two t, m, at which the first hop's SIR has an extremum on an edge, without noise. t is the coordinate
-/// that varies along the edge.
+/// Returns the two t, m, of the first hop's extrema on an edge, without noise.
+///
+/// t is the coordinate that varies along the edge.
 fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
     let half = 0.5 * (squared(p) + a - b);
-    // The larger root first, the other one from their product: neither cancels.
+    // The larger root first, the other from the product of both: neither loses digits.
     let root = libm::sqrt(squared(half) + squared(p) * b);
     let sum = half + libm::copysign(root, half);
     [sum / p, -p * b / sum]
 }
 
-/// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. An extremum that does
-/// not exist is NaN.
+/// Returns the three t, m, of the first hop's extrema on an edge, with noise.
 ///
-/// The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t - `p`)^2 + `a`, where the coordinate t varies
-/// along the edge. `noise` is nu.
+/// t is the coordinate that varies along the edge. The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t
+/// - `p`)^2 + `a`; `noise` is nu. An extremum that does not exist is NaN.
 fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     if !(libm::fabs(p) > 0.0) {
         let squared = libm::sqrt((b - a) / noise) - a;
@@ -231,10 +238,10 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     [-mirrored.hill(-behind), low, high].map(|t| libm::copysign(1.0, p) * t)
 }
 
-/// Number of lines of constant y on either side of y = 0 that the search at one altitude evaluates.
+/// Number of lines of constant y, on either side of y = 0, in the search at one altitude.
 const LINES: u8 = 24;
 
-/// Number of the best lines of constant y. Near these lines the search at one altitude is refined.
+/// Number of the best lines of constant y near which the search is refined.
 const FOLLOWED: usize = 3;
 
 /// Number of golden-section steps in y near each of the best lines of constant y.
@@ -242,11 +249,10 @@ const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
 
-/// Returns the position of a single relay with the highest SIR at the altitude `altitude_m`. x is limited to `along`,
-/// and y to `across`. The function finds the best x on several lines of constant y, and then refines y near the best
-/// three lines.
+/// Returns the position of a single relay with the highest SIR at the altitude `altitude_m`.
 ///
-/// Work: at most 243 lines of some 90 evaluations of both hops.
+/// x is limited to `along`, and y to `across`. The best x is found on several lines of constant y. Then y is refined
+/// near the best three lines. Work: at most 243 lines of some 90 evaluations of both hops.
 pub(super) fn best_in_corridor(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -270,7 +276,7 @@ pub(super) fn best_in_corridor(
         .best(hops, interferer)
     };
     let mut best = line(0.0);
-    // The best three, and the lines beside each.
+    // The three best lines, and the lines next to each.
     let mut followed = [(0.0_f32, 0.0_f32, 0.0_f32); FOLLOWED];
     for end in [across.least_m, across.most_m] {
         let at = |step: u8| {
@@ -308,8 +314,9 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts the line of constant y `new` into the list of the best lines, if it is good enough. Each entry has the
-/// best SIR on the line, and the y of the two adjacent lines.
+/// Inserts a line of constant y into the list of the best lines, if it is good enough.
+///
+/// Each entry has the best SIR on the line, and the y of the two adjacent lines.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {
@@ -319,9 +326,10 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     }
 }
 
-/// Returns the position in the plane y = `y_m` at which the two hops' curves of constant SIR touch. `None` if the
-/// position is not between Tx and Rx, or not within the altitudes `band`. Also `None` without noise, because the
-/// curves then do not touch. Work: 40 bisection steps.
+/// Returns the position in the plane y = `y_m` at which the curves of constant SIR of both hops touch.
+///
+/// `None` without noise, or if the position is not between Tx and Rx or not within the altitudes `band`. Work: 40
+/// bisection steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -355,9 +363,10 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane y = y0, with the numbers that determine both hops' SIRs at a point of the plane. The numbers are D
-/// (distance Tx-Rx), the interferer's X, (y0 - Y)^2, y0^2, the noise nu, and the ratio G = K / A of the hops' gains,
-/// in m and m^2.
+/// Vertical plane y = y0, with the numbers that both hops' SIRs depend on.
+///
+/// The numbers are D (distance Tx-Rx), the interferer's X, (y0 - Y)^2, y0^2, the noise nu, and the ratio G = K / A of
+/// the hops' gains, in m and m^2.
 struct Face {
     d: f64,
     x: f64,
@@ -368,8 +377,9 @@ struct Face {
 }
 
 impl Face {
-    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane. The result is the x of
-    /// this point minus the x of Rx, m. `r` is the radius of the circle, m.
+    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane.
+    ///
+    /// The result is its x minus the x of Rx, m. `r` is the radius of the circle, m.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);
@@ -378,8 +388,9 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// Returns the first hop's largest SIR on a circle about Rx in this plane, divided by the hop's gain. `r` is the
-    /// radius of the circle, m.
+    /// Returns the first hop's largest SIR on a circle about Rx in this plane, divided by the hop's gain.
+    ///
+    /// `r` is the radius of the circle, m.
     fn first(&self, r: f64) -> f64 {
         let (z, gap) = (self.best(r), self.d - self.x);
         let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;

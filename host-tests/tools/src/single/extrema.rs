@@ -1,6 +1,7 @@
-//! Extrema of SIR_1, the SIR of the first hop, along a line.
+//! Extrema of SIR_1, the SIR of the first hop, along a straight line.
 //!
-//! [`first_hop_turn`] returns those along x >= 0 at one altitude: the paper's Lemma 2, for any interferer position and with noise.
+//! [`first_hop_turn`] returns them for x >= 0 at one altitude. This is the paper's Lemma 2, for any interferer position
+//! and with noise.
 //!
 //! With s = (X - x)^2 + Y^2 + h^2 and q = X^2 + Y^2 the slope of SIR_1 = A s / ((x^2 + h^2)(1 + nu s)) has the sign of
 //!
@@ -12,9 +13,9 @@
 //!
 //! - X < 0: the expression falls with x from -X h^2 > 0 at Tx, so SIR_1 still has a single maximum, closer to Tx.
 //! - X = 0: the expression is negative.
-//! - X > 0: divided by x it is phi = X x - q - X h^2 / x - nu s^2, which is concave because s is convex and not negative, and so
-//!   is s^2. So SIR_1 falls to a minimum, rises to a maximum and then falls, or it only falls. No root is before the noise-free
-//!   minimum, where the sum of the first three terms is negative.
+//! - X > 0: divided by x it is phi = X x - q - X h^2 / x - nu s^2. This is concave, because s is convex and not
+//!   negative, so that s^2 is convex, too. So SIR_1 falls to a minimum, rises to a maximum and then falls, or it only
+//!   falls. No root is before the noise-free minimum, where the sum of the first three terms is negative.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -22,7 +23,7 @@ use uav_relay::root::sqrt;
 use uav_relay::sir::square;
 use uav_relay::{Interferer, Mission};
 
-/// Number type in which a root is searched: f32 as on board, or f64.
+/// Number type for the search of a root: f32 as on board, or f64.
 pub trait Real:
     Copy
     + PartialOrd
@@ -39,7 +40,7 @@ impl Real for f64 {}
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// The value searched is the one up to which `holds` returns true. It is assumed to be true at `low` and false at `high`.
+/// `holds` should be true at `low` and false at `high`. It changes between the returned ends.
 pub(super) fn bisected<T: Real>(
     low: T,
     high: T,
@@ -58,25 +59,28 @@ pub(super) fn bisected<T: Real>(
     (low, high)
 }
 
-/// Number of bisection steps for the x at which the first hop's SIR has an extremum.
+/// Number of bisection steps for the x of an extremum of the first hop's SIR.
 const HALVINGS: u8 = 32;
 
-/// Maximum number of doublings of x in the search for an x beyond an extremum of the first hop's SIR.
+/// Largest number of doublings of x in the search for an x beyond an extremum.
 const DOUBLINGS: u8 = 64;
 
 /// Shape of SIR_1, the SIR of the first hop, along x >= 0 at one altitude.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Extremum {
-    /// First hop's SIR along x falls up to this x, m (the paper's Psi^x), and rises beyond. The interferer is ahead
-    /// of Tx (X > 0).
+    /// First hop's SIR falls up to this x, m (the paper's Psi^x), and rises beyond.
+    ///
+    /// The interferer is ahead of Tx (X > 0).
     Valley(f32),
-    /// First hop's SIR falls up to the first x, m, rises up to the second x, and falls beyond. The interferer is
-    /// ahead of Tx (X > 0), with noise.
+    /// First hop's SIR falls up to the first x, m, rises up to the second x, and falls beyond.
+    ///
+    /// The interferer is ahead of Tx (X > 0), with noise.
     ValleyAndHill(f32, f32),
-    /// The first hop's SIR rises along x up to this x, m, and falls beyond it. The interferer is behind Tx (X < 0).
+    /// First hop's SIR rises up to this x, m, and falls beyond. The interferer is behind Tx (X < 0).
     Hill(f32),
-    /// First hop's SIR falls with x. The interferer is at X = 0, or the interferer is ahead of Tx and the noise
-    /// exceeds the interference.
+    /// First hop's SIR falls with x.
+    ///
+    /// The interferer is at X = 0, or it is ahead of Tx and the noise exceeds the interference.
     Falls,
     /// First hop's SIR is the same at every x: the interferer is at Tx, and there is no noise.
     Level,
@@ -84,8 +88,8 @@ pub enum Extremum {
 
 /// Returns the extrema of SIR_1, the first hop's SIR, along x for a relay at `altitude_m`.
 ///
-/// Without noise they are roots of a quadratic, written without cancellation for X < 0; with noise they take at most 190
-/// evaluations of the slope. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
+/// Without noise they are roots of a quadratic. With noise they take at most 190 evaluations of the slope. Accuracy:
+/// `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
 pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f32) -> Extremum {
     let x = interferer.x_m;
     let q = square(x) + square(interferer.y_m);
@@ -119,12 +123,12 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// Function phi(t) with the sign of the slope of the first hop's SIR at t, a position on a line.
+/// Function phi(t) with the sign of the slope of the first hop's SIR at t on a straight line.
 ///
 /// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2. On a line along x p is the X of the interferer.
 #[derive(Debug)]
 pub(super) struct Slope<T> {
-    /// t of the point closest to the interferer, m; 0 is the t of the point closest to Tx.
+    /// t of the point closest to the interferer, m. The point closest to Tx has t = 0.
     pub(super) p: T,
     /// Difference p^2 + a - b, m^2.
     pub(super) q: T,
@@ -145,8 +149,9 @@ impl<T: Real> Slope<T> {
         p * t - q - p * (b / t) - self.noise * s * s > T::from(0.0)
     }
 
-    /// Returns true if phi rises at `t`, m, for p > 0. Beyond p the derivative of phi falls with t, so phi has at
-    /// most one maximum there.
+    /// Returns true if phi rises at `t`, m, for p > 0.
+    ///
+    /// Beyond p the derivative of phi falls with t, so phi has at most one maximum there.
     fn bends_up(&self, t: T) -> bool {
         let Self { p, a, b, .. } = *self;
         let s = (t - p) * (t - p) + a;
@@ -159,8 +164,9 @@ impl<T: Real> Slope<T> {
         bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
     }
 
-    /// Returns the minimum and the maximum of the SIR for p > 0, m. `bottom` is the minimum without noise. `None` if
-    /// the SIR only falls.
+    /// Returns the minimum and the maximum of the SIR for p > 0, m; `None` if the SIR only falls.
+    ///
+    /// `bottom` is the minimum without noise.
     pub(super) fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
         let bends_up = |t: T| self.bends_up(t);
         if !bends_up(bottom) {

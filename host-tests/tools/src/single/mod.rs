@@ -10,10 +10,10 @@
 //! | altitude, noise only | [`without_interferer`] | the paper's special case without interference |
 //!
 //! They use the locus of equal SIRs ([`theorems::equal_altitudes`], Lemma 1) and the extrema of the first hop's SIR
-//! ([`extrema::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which the cases
-//! change. SIR_2 always rises with x and falls with the altitude. With receiver noise SIR_1 may have one more extremum, and the
-//! optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise but
-//! [`without_interferer::best_in_noise`], which has its own.
+//! ([`extrema::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which
+//! the cases change. SIR_2 always rises with x and falls with the altitude. With receiver noise SIR_1 may have one more
+//! extremum, and the optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise, except
+//! [`without_interferer::best_in_noise`], which has a noise argument.
 
 pub mod aside;
 mod edge;
@@ -24,11 +24,12 @@ pub mod without_interferer;
 use uav_relay::sir::{self, Sender};
 use uav_relay::{Mission, Placement, Profile};
 
-/// Number of bisection steps for the x at which both hops have the same SIR. The result is exact to a step of an f32.
+/// Number of bisection steps for the x of equal SIRs. The result is exact to a step of an f32.
 const HALVINGS: u8 = 40;
 
-/// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field the SIR is
-/// a mean.
+/// Position of a single relay, and the SIR of the worse of its two hops, linear.
+///
+/// In an interference field the SIR is a mean.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Found {
     /// Position of the single relay.
@@ -38,13 +39,13 @@ pub struct Found {
 }
 
 impl Found {
-    /// Returns `self` or `other`, whichever has the higher SIR; `self` if both are equal.
+    /// Returns the one of `self` and `other` with the higher SIR; `self` if both are equal.
     fn or(self, other: Self) -> Self {
         if other.sir > self.sir { other } else { self }
     }
 }
 
-/// SIRs of both hops of a mission with a single relay, for any position of that relay.
+/// SIRs of both hops of a single relay, for any position of that relay.
 #[derive(Clone, Copy)]
 struct TwoHops<'a> {
     mission: &'a Mission,
@@ -65,11 +66,11 @@ impl TwoHops<'_> {
         }
     }
 
-    /// Returns the position on a line where both hops have the same SIR. Of the two adjacent f32 values of the
-    /// varying coordinate, the value with the better SIR is returned.
+    /// Returns the position on a straight line at which both hops have the same SIR.
     ///
-    /// `is_low` returns true for a value of this coordinate that is below the searched value. The search is from
-    /// `low` to `high`, m. `place` returns the position for a value.
+    /// `is_low` returns true for a value of the varying coordinate below the searched one. The search is from `low` to
+    /// `high`, m. `place` returns the position for a value. Of the two adjacent f32 values, the one with the better SIR
+    /// is returned.
     fn crossing(
         &self,
         low: f32,
@@ -93,7 +94,7 @@ impl TwoHops<'_> {
     }
 }
 
-/// SIRs of both hops of a chain with a single relay, above the line Tx to Rx at one altitude.
+/// SIRs of both hops of a single relay at one altitude, with y = 0.
 #[derive(Clone, Copy)]
 struct Two<'a> {
     hops: TwoHops<'a>,
@@ -131,8 +132,9 @@ impl<'a> Two<'a> {
         self.first(x_m) <= self.second(x_m)
     }
 
-    /// Returns the position at which the first hop's SIR falls below the second hop's SIR. Its x is from `low` to
-    /// `high`, m.
+    /// Returns the position at which the first hop's SIR falls below the second hop's SIR.
+    ///
+    /// Its x is from `low` to `high`, m.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let is_low = |x_m| self.first(x_m) > self.second(x_m);
         self.hops.crossing(low, high, is_low, |x_m| self.at(x_m))

@@ -1,18 +1,19 @@
-//! Single relay above the line, and one interferer anywhere: Lemma 1, Corollary 1, and Theorems 1 to 3.
+//! Single relay with y = 0, and one interferer anywhere: Lemma 1, Corollary 1, and Theorems 1 to 3.
 //!
 //! # Given altitude: Corollary 1 and Theorem 1
 //!
 //! [`best_at_altitude`] has the optimum.
 //!
-//! SIR_2 rises with x. For X > 0 SIR_1 falls to a minimum and rises beyond, so the worse one is maximal where they cross before
-//! the minimum, or above Rx. With the interferer behind Tx (X < 0), which the paper omits, SIR_1 rises to a maximum and falls
-//! beyond. Up to the maximum both rise, so the optimum is the maximum, the crossing beyond it, or above Rx.
+//! SIR_2 rises with x. For X > 0 SIR_1 falls to a minimum and rises beyond. The worse SIR is therefore largest where
+//! they cross before the minimum, or above Rx. The paper omits an interferer behind Tx (X < 0). SIR_1 then rises to a
+//! maximum and falls beyond. Up to the maximum both rise, so the optimum is the maximum, the crossing beyond it, or
+//! above Rx.
 //!
-//! With noise SIR_1 finally falls: beyond its minimum it has a maximum, or it has neither. Up to the maximum both rise; beyond,
-//! the optimum is the maximum, the crossing, or above Rx.
+//! With noise SIR_1 falls at last: it has a minimum and then a maximum, or neither. Between minimum and maximum both
+//! rise. So beyond the minimum, the optimum is the maximum, the crossing after it, or above Rx.
 //!
-//! The crossing is a root of the paper's quartic. Its coefficients cancel in f32, but the SIRs themselves do not, so the root is
-//! found by bisection of an interval on which their difference changes its sign once.
+//! The crossing is a root of the paper's quartic. Its coefficients lose their digits in f32, but the SIRs do not. The
+//! root is therefore found by bisection of an interval in which the difference of the SIRs changes its sign once.
 //!
 //! Accuracy: `theorem_1_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 //!
@@ -20,12 +21,13 @@
 //!
 //! [`best_at_x`] has the optimum.
 //!
-//! SIR_2 falls with the altitude. SIR_1 = A (a + h^2) / (b + h^2) with a = (x - X)^2 + Y^2 and b = x^2 falls too, unless X > 0
-//! and x is beyond the paper's Psi^h = (X^2 + Y^2) / 2X. There it rises, and the worse one is maximal where they are equal (Lemma
-//! 1), or at an end of the band.
+//! SIR_2 falls with the altitude. SIR_1 = A (a + h^2) / (b + h^2) with a = (x - X)^2 + Y^2 and b = x^2 falls too,
+//! unless X > 0 and x is beyond the paper's Psi^h = (X^2 + Y^2) / 2X. There it rises, and the worse SIR is largest
+//! where they are equal (Lemma 1), or at an end of the permitted altitudes.
 //!
-//! With noise SIR_1 = A (a + h^2) / ((b + h^2)(1 + nu (a + h^2))) rises only while nu (a + h^2)^2 < b - a, and falls above that,
-//! as SIR_2 does. So no higher altitude is better, and below it everything is as without noise.
+//! With noise SIR_1 = A (a + h^2) / ((b + h^2)(1 + nu (a + h^2))) rises only while nu (a + h^2)^2 < b - a, and falls
+//! above that altitude, as SIR_2 does. So no higher altitude is better. Below that altitude the solution is as without
+//! noise.
 //!
 //! Accuracy: `theorem_2_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 //!
@@ -33,15 +35,18 @@
 //!
 //! [`best_free`] has the optimum.
 //!
-//! The optimum is on the edge of the box [0, D] x band. Inside, SIR_1 and SIR_2 would have to be equal with opposite slopes,
-//! since neither has a stationary point there: their level lines would touch. But those of SIR_1 are circles about ground points,
-//! and those of SIR_2 circles about Rx, and such circles touch on the ground only. Two of the printed cases miss this, and are
-//! wrong (by a factor of 17 in the first counterexample of the tests).
+//! The optimum is on an edge of the rectangle of allowed x and altitudes. Inside, SIR_1 and SIR_2 would have to be
+//! equal with opposite slopes, since neither has a stationary point there. Their curves of constant SIR would touch.
+//! But for SIR_1 these are circles about ground points, and for SIR_2 circles about Rx. Such circles touch on the
+//! ground only. Two of the printed cases miss this, and are wrong (by a factor of 17 in the first counterexample of the
+//! tests).
 //!
-//! On the edges Theorems 1 and 2 are exact, and the best of the edges is the optimum. Right above Tx both SIRs fall with the
-//! altitude, so only the lowest position of that edge counts, which is on the lowest edge too: three edges are left.
+//! On the edges Theorems 1 and 2 are exact, and the best of the edges is the optimum. Right above Tx both SIRs fall
+//! with the altitude, so only the lowest position of that edge counts. It is also on the lowest edge, so three edges
+//! are left.
 //!
-//! With noise the level lines of SIR_1 are no circles, and there is one position inside at which they may touch: see `edge`.
+//! With noise the curves of constant SIR_1 are no circles. They may then touch those of SIR_2 at one position inside:
+//! see `edge`.
 //!
 //! Accuracy: `theorem_3_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 //!
@@ -49,8 +54,9 @@
 //!
 //! [`power_ratios`] are the ratios p_t / p_u at which the cases of Corollary 1 change.
 //!
-//! SIR_1 / SIR_2 is proportional to p_t / p_u, so each is the ratio at which the two are equal at one position: above Tx (C_1),
-//! above Rx (C_2), and at the minimum of SIR_1 (C_3). The paper prints them as formulas; here they are computed from the SIRs.
+//! SIR_1 / SIR_2 is proportional to p_t / p_u. With each ratio the two are equal at one position: above Tx (C_1), above
+//! Rx (C_2), and at the minimum of SIR_1 (C_3). The paper prints them as formulas; here they are computed from the
+//! SIRs.
 //!
 //! # Locus of equal SIR of both hops: Lemma 1
 //!
@@ -82,42 +88,52 @@ use super::edge::{squared, touching_inside};
 use super::extrema::{Extremum, first_hop_turn};
 use super::{Found, Two, TwoHops};
 
-/// Case of the optimal x at a given altitude. The first five cases are the cases of the paper's Corollary 1, for an
-/// interferer at X >= 0.
+/// Case of the optimal x at a given altitude.
+///
+/// The first five cases are the cases of the paper's Corollary 1, for an interferer at X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum PlaceCase {
-    /// Optimum at x = 0: even right above Tx the first hop's SIR is lower than the second hop's. The ratio of the
-    /// powers of Tx and relay is below C_1 ([`Guide::c1`]).
+    /// Optimum above Tx: even there the first hop's SIR is lower than the second hop's.
+    ///
+    /// The ratio of the powers of Tx and relay is below C_1 ([`Guide::c1`]).
     AboveTx = 1,
-    /// Optimum at the only x where both hops have the same SIR. The first hop's SIR falls all the way to Rx, and
-    /// equals the second hop's SIR once.
+    /// Optimum at the only x with the same SIR on both hops.
+    ///
+    /// The first hop's SIR falls all the way to Rx, and equals the second hop's SIR once.
     Crossing = 2,
-    /// Optimum above Rx: the first hop's SIR falls all the way to Rx. Above Rx it is still higher than the second
-    /// hop's.
+    /// Optimum above Rx: the first hop's SIR falls all the way to Rx.
+    ///
+    /// Above Rx it is still higher than the second hop's.
     AboveRx = 3,
-    /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. If the worse
-    /// hop's SIR is higher above Rx, the optimum is above Rx instead: the first hop's SIR rises again beyond its
-    /// minimum.
+    /// Optimum at an x with the same SIR on both hops, before the minimum of the first hop's SIR.
+    ///
+    /// The first hop's SIR rises again beyond its minimum. If the worse hop's SIR is then higher above Rx, the optimum
+    /// is above Rx instead.
     BeforeValley = 4,
-    /// Optimum above Rx: the first hop's SIR has a minimum before Rx. At that minimum it is still higher than the
-    /// second hop's.
+    /// Optimum above Rx: the first hop's SIR has a minimum before Rx.
+    ///
+    /// At that minimum it is still higher than the second hop's.
     OverValley = 5,
-    /// Optimum at the maximum of the first hop's SIR. There it is still lower than the second hop's SIR. The
-    /// interferer is behind Tx.
+    /// Optimum at the maximum of the first hop's SIR, which is still lower there than the second hop's.
+    ///
+    /// The interferer is behind Tx.
     Hilltop = 6,
-    /// Optimum where both hops have the same SIR, beyond the maximum of the first hop's SIR. The interferer is behind
-    /// Tx.
+    /// Optimum at an x with the same SIR on both hops, beyond the maximum of the first hop's SIR.
+    ///
+    /// The interferer is behind Tx.
     BeyondHill = 7,
-    /// Optimum above Rx, with the interferer behind Tx. The first hop's SIR rises all the way to Rx, or above Rx it
-    /// is still higher than the second hop's.
+    /// Optimum above Rx, with the interferer behind Tx.
+    ///
+    /// The first hop's SIR rises all the way to Rx, or is still higher above Rx than the second hop's.
     HillAboveRx = 8,
     /// Optimum above Rx: the interferer is at Tx, so the first hop's SIR is the same at every x.
     Level = 9,
     /// Optimum above Rx: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 10,
-    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. If the optimum is beyond this
-    /// maximum, both hops have the same SIR there. This case occurs only with noise.
+    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum; only with noise.
+    ///
+    /// If the optimum is beyond this maximum, both hops have the same SIR there.
     SecondHill = 11,
 }
 
@@ -133,10 +149,10 @@ impl PlaceCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case. `None` in an interference
-/// field.
+/// Returns the optimal position of a relay with `profile` and y = 0, and its case; `None` in a field.
 ///
-/// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
+/// It is between Tx and Rx. Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230
+/// more.
 pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
     let two = Two::new(mission, profile);
@@ -145,7 +161,7 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
     if !(two.second(end_m) > 0.0) {
         return Some((above_rx, PlaceCase::Drowned));
     }
-    // End of the falling part of SIR_1, and true if it rises again before Rx.
+    // End of the falling part of SIR_1, and true if SIR_1 rises again before Rx.
     let turn = first_hop_turn(mission, interferer, profile.altitude_m);
     let (to, valley) = match turn {
         Extremum::Level => return Some((above_rx, PlaceCase::Level)),
@@ -181,8 +197,8 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
 
 /// Returns the best position at or beyond the maximum that the first hop's SIR has with noise.
 ///
-/// Along x that SIR falls to a minimum, rises to this maximum, and falls again. `None` if there is no such maximum at
-/// x below `end_m`.
+/// Along x this SIR falls to a minimum, rises to the maximum, and falls again. `None` if there is no such maximum below
+/// `end_m`.
 fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;
@@ -199,18 +215,21 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     })
 }
 
-/// Case of the optimal altitude at a given x. The first three cases are the cases of the paper's Theorem 2.
+/// Case of the optimal altitude at a given x.
+///
+/// The first three cases are the cases of the paper's Theorem 2.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum AltitudeCase {
-    /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises. This is so if X <= 0, or if x <=
-    /// (X^2 + Y^2) / 2X (the paper's Psi^h), with the interferer at (X, Y).
+    /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises.
+    ///
+    /// This is so if X <= 0, or if x <= (X^2 + Y^2) / 2X (the paper's Psi^h), with the interferer at (X, Y).
     BothFall = 1,
-    /// Optimum at the altitude where the first hop's SIR equals the second hop's SIR. The first hop's SIR rises with
-    /// altitude.
+    /// Optimum at the altitude with the same SIR on both hops. The first hop's SIR rises with the altitude.
     Crossing = 2,
-    /// Optimum at the lowest altitude, or at the altitude of the first hop's largest SIR. The two hops' SIRs are
-    /// equal at no altitude in between.
+    /// Optimum at the lowest altitude, or at the altitude of the first hop's largest SIR.
+    ///
+    /// The two hops' SIRs are equal at no altitude in between.
     End = 3,
     /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,
@@ -226,11 +245,10 @@ impl AltitudeCase {
     }
 }
 
-/// Returns the optimal altitude in the mission's range, m, and its case. The relay has `power_w` watts and is at
-/// `x_m`, which is between Tx (0) and Rx (D).
+/// Returns the optimal position at `x_m` within the mission's altitudes, and its case.
 ///
-/// `None` in an interference field, and for `x_m` outside [0, D]. Work: at most six evaluations of both hops and one
-/// of Lemma 1.
+/// The relay has `power_w` watts. `None` in an interference field, and for `x_m` outside [0, D], from Tx to Rx. Work:
+/// at most six evaluations of both hops and one of Lemma 1.
 pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, AltitudeCase)> {
     let interferer = mission.interferer()?;
     if !(0.0..=mission.config().distance_m).contains(&x_m) {
@@ -256,7 +274,8 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     if lowest.first(x_m) > lowest.second(x_m) || highest.first(x_m) < highest.second(x_m) {
         return Some((low.or(highest.found(x_m)), AltitudeCase::End));
     }
-    // SIR_1 is smaller below the crossing, SIR_2 above: it is the larger root, unless that is where SIR_1 falls.
+    // SIR_1 is smaller below the crossing, and SIR_2 above it. So the crossing is the larger root, unless SIR_1 falls
+    // there.
     let [lower, upper] = equal_altitudes(mission, x_m, power_w);
     let crossing = upper
         .filter(|upper| !(*upper > top_m && mission.noise_at_a_metre() > 0.0))
@@ -268,8 +287,9 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if the first hop's SIR rises with the altitude at `x_m`. The second result is the altitude at which
-/// the rise ends, m, limited to the permitted range `band`.
+/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and the end of this rise, m.
+///
+/// The end is limited to the permitted range `band`.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
@@ -282,8 +302,9 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Location of the optimum in the rectangle of allowed x and altitudes: an edge, or its inside. An optimum at a
-/// corner counts for the edge that is first in this list.
+/// Location of the optimum in the rectangle of allowed x and altitudes: an edge, or the inside.
+///
+/// An optimum at a corner counts for the edge that is first in this list.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum FreeCase {
     /// Optimum at the lowest altitude, with this case of the optimal x (Theorem 1).
@@ -292,15 +313,16 @@ pub enum FreeCase {
     Highest(PlaceCase),
     /// Optimum above Rx, with this case of the optimal altitude (Theorem 2).
     AboveRx(AltitudeCase),
-    /// Optimum inside the rectangle of x and altitude; only with noise. The curves of constant SIR of both hops touch
-    /// there.
+    /// Optimum inside the rectangle of x and altitude; only with noise.
+    ///
+    /// The curves of constant SIR of both hops touch there.
     Touching,
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. Its x
-/// is between Tx and Rx, and its altitude in the mission's range.
+/// Returns the optimal x and altitude of a relay of `power_w` watts with y = 0, and its case.
 ///
-/// Work: at most 190 evaluations of both hops and one of Lemma 1.
+/// x is between Tx and Rx, and the altitude in the mission's range. `None` in an interference field. Work: at most 190
+/// evaluations of both hops and one of Lemma 1.
 pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     let config = mission.config();
     let level = |altitude_m: f32| {
@@ -328,19 +350,21 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     Some(best)
 }
 
-/// Limits of the power ratio p_t / p_u, linear, at which the case of the optimal x changes. p_t and p_u are the
-/// powers of Tx and relay. The cases are those of the paper's Corollary 1.
+/// Limits of the power ratio p_t / p_u, linear, between the cases of the optimal x.
+///
+/// p_t and p_u are the powers of Tx and relay. The cases are those of the paper's Corollary 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Guide {
-    /// Ratio C_1: if p_t / p_u is below C_1, the first hop is worse than the second even right above Tx. C_1 is 0 if
-    /// the interferer is at Rx.
-    pub c1: f32,
-    /// Ratio C_2: if p_t / p_u is above C_2, the first hop is better than the second even right above Rx.
-    pub c2: f32,
-    /// Ratio C_3. If p_t / p_u is above C_3, the first hop is better than the second hop even at the minimum of the first hop's SIR.
+    /// Ratio C_1: below it, the first hop is worse than the second even right above Tx.
     ///
-    /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, for example with an interferer at X <= 0. With noise the
-    /// SIR has a minimum and then a maximum; C_3 belongs to the minimum.
+    /// C_1 is 0 if the interferer is at Rx.
+    pub c1: f32,
+    /// Ratio C_2: above it, the first hop is better than the second even right above Rx.
+    pub c2: f32,
+    /// Ratio C_3: above it, the first hop is better than the second even at the minimum of its SIR.
+    ///
+    /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, for example with an interferer at X
+    /// <= 0. With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
     pub c3: Option<f32>,
 }
 
@@ -369,11 +393,11 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
     })
 }
 
-/// Returns the altitudes at which both hops have the same SIR, m, lower first: the paper's h^- and h^+. The relay has `power_w` watts and
-/// is at `x_m`.
+/// Returns the altitudes at which both hops have the same SIR, m: the paper's h^- and h^+.
 ///
-/// `x_m` and `power_w` are not limited. Altitudes are above 0, and not limited to the mission's range. An altitude that does not exist is
-/// `None`; in an interference field both are `None`. Constant work.
+/// The lower altitude is first. The relay has `power_w` watts and is at `x_m`; these two are not limited. Altitudes are
+/// above 0, and not limited to the mission's range. An altitude that does not exist is `None`; in an interference field
+/// both are `None`. Constant work.
 pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
     let Some(interferer) = mission.interferer() else {
         return [None; 2];
@@ -391,7 +415,7 @@ pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32
     if discriminant < 0.0 {
         return [None; 2];
     }
-    // The larger root first, the other one from their product: neither cancels.
+    // The larger root first, the other from the product of both: neither loses digits.
     let far = -(half + libm::copysign(libm::sqrt(discriminant), half));
     let near = if libm::fabs(far) > 0.0 {
         product / far

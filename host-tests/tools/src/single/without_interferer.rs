@@ -13,14 +13,14 @@
 //!
 //! # Field: Algorithm 3, as corrected, and its limit
 //!
-//! With one relay E(SIR_2) rises with x, so a target gamma determines x = D - sqrt(A / gamma - h^2), where E(SIR_2) is gamma. The
-//! printed algorithm takes the first gamma, from the top, that E(SIR_1) meets there. That is not optimal: a position whose
-//! E(SIR_1) is below its gamma may still be better than one that meets a lower gamma. So it has to continue until gamma is at
-//! most the best min(gamma, E(SIR_1)) so far.
+//! With one relay E(SIR_2) rises with x, so a target gamma determines x = D - sqrt(A / gamma - h^2), where E(SIR_2) is
+//! gamma. The printed algorithm takes the first gamma, from the top, that E(SIR_1) meets there. That is not optimal: a
+//! position whose E(SIR_1) is below its gamma may still be better than one that meets a lower gamma. The corrected
+//! algorithm continues until gamma is at most the best min(gamma, E(SIR_1)) so far.
 //!
-//! [`best_in_field`] needs no step. Between two points of the field E(SIR_1) = c (a + b x) / (x^2 + h^2), whose extrema are the
-//! roots of a quadratic. So each section has intervals on which it is monotone, and the optimum of an interval is at an end or
-//! where the two SIRs cross. [`stepped`] is the algorithm.
+//! [`best_in_field`] needs no step. Between two points of the field E(SIR_1) = c (a + b x) / (x^2 + h^2), and its
+//! extrema are the roots of a quadratic. Between two extrema it is monotone, so the optimum is at an end or where the
+//! two SIRs cross. [`stepped`] is the algorithm.
 //!
 //! Accuracy: `host-tests/tests/single.rs`, against a dense search in f64.
 
@@ -42,8 +42,8 @@ pub struct Noise {
 
 /// Returns the optimal position of a relay with `profile` against `noise` only, and its SNR (linear).
 ///
-/// Only the mission's distance, Tx power and channel are used. The relay flies at the altitude of `profile`; a lower altitude would always
-/// be better. Constant work.
+/// Only the mission's distance, Tx power and channel are used. The relay has the altitude of `profile`; a lower
+/// altitude would always be better. Constant work.
 pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found {
     let config = mission.config();
     let (d, h) = (config.distance_m, profile.altitude_m);
@@ -56,7 +56,8 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
         (first, second)
     };
     let r = second_w / first_w;
-    // If they are equal nowhere between Tx and Rx, the root is beyond the optimal end, also with the discriminant cut to 0.
+    // If the SNRs are equal nowhere between Tx and Rx, the root is beyond the optimal end. This holds with the
+    // discriminant cut to 0, too.
     let root = sqrt(r * square(d) - square((1.0 - r) * h));
     let x_m = ((square(d) + (1.0 - r) * square(h)) / (d + root))
         .max(0.0)
@@ -68,14 +69,15 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
     }
 }
 
-/// Returns the position between the x `low` and `high`, m, at which the worse hop has its largest SIR. The first
-/// hop's mean SIR must only rise or only fall there.
+/// Returns the position from `low` to `high`, m, at which the worse hop has its largest SIR.
+///
+/// The first hop's mean SIR must only rise or only fall there.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {
         return ends;
     }
-    // E(SIR_1) is above at one end and below at the other, and E(SIR_2) rises: they cross once.
+    // E(SIR_1) is above E(SIR_2) at one end and below at the other, and E(SIR_2) rises. So they cross once.
     ends.or(two.crossing(low, high))
 }
 
@@ -115,9 +117,10 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     Some(best)
 }
 
-/// Returns both extrema of the first hop's mean SIR along x, ascending, m. `upsilon` = E[1/I] is linear in [`low`,
-/// `high`]: for Upsilon = a + b x they are the roots of b x^2 + 2 a x - b h^2 = 0, with the altitude h. `high` twice
-/// if Upsilon is constant.
+/// Returns both extrema of the first hop's mean SIR along x, ascending, m.
+///
+/// `upsilon` = E[1/I] is linear in [`low`, `high`]. For Upsilon = a + b x the extrema are the roots of b x^2 + 2 a x -
+/// b h^2 = 0, with the altitude h. If Upsilon is constant, both results are `high`.
 fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (upsilon(low), upsilon(high));
     let b = (at_high - at_low) / (high - low);
@@ -133,10 +136,11 @@ fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> 
     [one.min(other), one.max(other)]
 }
 
-/// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without a field.
+/// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon`.
 ///
-/// The algorithm evaluates only positions at which the second hop's mean SIR equals one of its targets. It can miss the optimum of a field
-/// that changes much between two such positions. Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// `epsilon` is linear, above 0. `None` without a field. The algorithm evaluates only positions at which the second
+/// hop's mean SIR equals a target. It can miss the optimum of a field that changes much between two such positions.
+/// Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two::new(mission, profile);

@@ -1,4 +1,4 @@
-//! Altitudes: a common one, Algorithm 2 by round, and the joint method.
+//! Altitudes: one for all relays, Algorithm 2 by round, and the joint method.
 
 use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
@@ -35,9 +35,7 @@ fn chains_at_one_altitude_agree_with_the_reference() {
     }
 }
 
-/// Checks the figure's SIRs with the paper's step of 0.1 against the reference.
-///
-/// The altitudes are 195 m to 230 m.
+/// Checks the SIRs with the paper's step of 0.1 against the reference, from 195 m to 230 m.
 #[test]
 fn the_step_ends_where_the_reference_does() {
     let table = Table::read("altitude");
@@ -86,7 +84,7 @@ fn chain_shapes_have_the_sir_of_their_round() {
         };
         assert!(joint::keeps_rules(&rounded, CORRIDOR, &[], &places));
     }
-    // Statements on the page.
+    // Statements in the text of the page.
     let at = |round: f64, relay: f64| shapes.row(&[("round", round), ("relay", relay)]);
     assert!(
         at(50.0, 1.0).number("altitude_m") < 160.0 && at(50.0, 50.0).number("altitude_m") < 180.0
@@ -101,7 +99,7 @@ fn chain_shapes_have_the_sir_of_their_round() {
     assert!(step(500.0, 49.0) < step(500.0, 25.0));
 }
 
-/// Checks Algorithm 2 against a separate program, which maximises each relay's SIR exactly.
+/// Checks Algorithm 2 against a separate program that maximises each relay's SIR exactly.
 ///
 /// The SIR never falls, and stays below the joint optimum. The search on a coarse grid gains nothing.
 #[test]
@@ -176,9 +174,9 @@ fn link_of_one(y_i: f64) -> Link {
     }
 }
 
-/// Returns the best SIR of one relay by the reference search, linear. The interferer is at y = `y_i`, m.
+/// Returns the best SIR of one relay from the recorded optima, linear.
 ///
-/// The relay may be up to `room_m` beside the line and `most_m` high.
+/// The interferer is at y = `y_i`, m. The relay may have y up to `room_m` on either side, and altitudes up to `most_m`.
 fn judged(y_i: f64, room_m: f64, most_m: f64) -> f64 {
     let corridor = Corridor {
         least_m: ALTITUDES_M.0,
@@ -230,7 +228,7 @@ fn gains_by_side_and_altitude_agree_with_the_reference() {
             within(got, judged(y, room, most), 1e-5, 1e-5);
             assert!(got <= both * (1.0 + 1e-6));
         }
-        // Lateral freedom is worth more than altitude, and with the largest room the lowest altitude is best.
+        // Lateral freedom gains more than altitude.
         assert!(of[2].0 >= of[1].0 * (1.0 - 1e-6) || y <= 0.0, "{y}");
     }
 }

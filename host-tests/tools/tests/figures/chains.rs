@@ -82,7 +82,7 @@ fn the_fewest_relays_agree_with_the_reference() {
     }
 }
 
-/// Checks that an interferer nearer to the line costs more relays, and that more power costs fewer.
+/// Checks that an interferer nearer to the line needs more relays, and that more power needs fewer.
 ///
 /// The page of the figures says so.
 #[test]
@@ -122,7 +122,7 @@ fn the_fewest_relays_change_as_the_text_says() {
     }
 }
 
-/// Returns the x of each relay as far toward Rx as `target` (linear SIR) allows, by the reference.
+/// Returns the x of each relay by the reference, as far toward Rx as `target` (linear SIR) allows.
 fn stretched(link: &Link, target: f64) -> Vec<f64> {
     let mut from = 0.0;
     (1..=link.len())
@@ -212,7 +212,7 @@ fn the_cost_of_settling_is_that_of_the_schedules() {
         let relays = row.number("relays");
         let is_that = |n: &u16| f64::from(*n) == relays;
         let link = Link::paper(usize::from((1..=100).find(is_that).unwrap()));
-        // The reference takes half a minute for as many sweeps of a hundred relays.
+        // With a hundred relays the reference would take half a minute for this number of passes of messages.
         let tried = if relays < 15.0 {
             let (tried, target) = link.fixed_step(0.1).unwrap();
             within(row.number("step_sir_linear"), target, 1e-5, 1e-5);
@@ -223,9 +223,9 @@ fn the_cost_of_settling_is_that_of_the_schedules() {
             9857.0
         };
         assert_eq!(row.number("step_sweeps"), tried);
-        // Each sweep takes a message and an answer per neighbour pair, which also count as signs of life. In the hours that
-        // takes, each relay claims its index: six times at the start, then every 15 s, in which a link carries more than 700
-        // sweep frames.
+        // In each pass of messages, every pair of neighbours exchanges a message and an answer, which also count as
+        // signs of life. Each relay also claims its index: six times at the start, then every 15 s. In 15 s a link
+        // carries more than 700 frames of a pass.
         let hops = relays - 1.0;
         let sweeps = 2.0 * hops * tried;
         let claims = row.number("step_messages") - sweeps;
@@ -245,7 +245,7 @@ fn the_cost_of_settling_is_that_of_the_schedules() {
         for name in ["predicted_sir_linear", "bracketed_sir_linear"] {
             within(row.number(name), optimum, 1e-4, 2e-6);
         }
-        // 95 bytes: average of a sweep with sixteen targets and its verdict.
+        // 95 bytes is the mean size of a message with sixteen targets and of its answer.
         assert_eq!(row.number("predicted_bytes"), 2.0 * hops * 95.0);
         let a_message = row.number("step_bytes") / row.number("step_messages").max(1.0);
         assert!(
@@ -262,7 +262,7 @@ fn densities_are_beta_distributions() {
     for (alpha, beta) in shapes {
         let rows = table.rows(&[("alpha", alpha), ("beta", beta)]);
         let at = |row: &Row<'_>| (row.number("interference_over_i_max"), row.number("density"));
-        // Trapezoidal rule on the table's points.
+        // Trapezoidal rule on the points of the table.
         let integral = |of: &dyn Fn(f64, f64) -> f64| {
             let terms = rows.windows(2).map(|pair| {
                 let ((a, f), (b, g)) = (at(&pair[0]), at(&pair[1]));
@@ -302,7 +302,7 @@ fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {
     integral(alpha - 2.0) / integral(alpha - 1.0)
 }
 
-/// Returns a reference link with the interference that the figure's table calls `field`.
+/// Returns a reference link in the field that the figure's table calls `field`.
 ///
 /// It has `relays` relays of 1 W at 20 m.
 fn field_link(field: &str, relays: usize) -> StochasticLink {
@@ -372,7 +372,7 @@ fn sweeps_of_algorithm_4_agree_with_the_reference() {
             for row in &rows {
                 let target = link.ceiling() - 0.1 * (row.number("sweep") - 1.0);
                 assert!((row.number("target_linear") - target).abs() < 1e-6);
-                // Slightly below the target, so that rounding does not decide about a tail straight above Rx.
+                // Slightly below the target: rounding must not decide about a last relay straight above Rx.
                 let places = link.backward(target * (1.0 - 1e-12)).unwrap();
                 within(
                     row.number("sir_linear"),
@@ -408,11 +408,9 @@ fn algorithm_4_ends_where_the_reference_program_does() {
     }
 }
 
-/// Checks that lowering the target SIR in steps of 0.1 misses the optimum SIR of eight relays.
+/// Checks that steps of 0.1 in the target SIR miss the optimum SIR of eight relays.
 ///
-/// The optimum is 0.0912; the steps end near 0.
-///
-/// The page of the figures says so.
+/// The optimum is 0.0912; the steps end near 0. The page of the figures says so.
 #[test]
 fn a_step_of_a_tenth_finds_little_for_eight_relays() {
     let last = |relays: u16| {

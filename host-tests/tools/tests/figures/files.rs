@@ -110,7 +110,7 @@ fn tables_state_their_scenario_and_units() {
 
 /// Returns the left and right end of a text in an SVG picture, px.
 ///
-/// Letters are taken to be 0.6 times as wide as the font size.
+/// A letter counts as 0.6 times as wide as the font size.
 fn extent(text: &Node<'_, '_>) -> (f64, f64) {
     let number = |name: &str| text.attribute(name).unwrap().parse::<f64>().unwrap();
     let letters = text.text().unwrap().trim().chars().count() as f64;
@@ -140,7 +140,7 @@ fn pictures_are_valid_and_their_text_is_inside() {
         {
             let y: f64 = text.attribute("y").unwrap().parse().unwrap();
             assert!(y >= 0.0 && y <= size("height"), "{:?}", text.text());
-            // At least 6 points if the width is printed at 8 cm.
+            // At least 6 points if the picture is printed 8 cm wide.
             let height: f64 = text.attribute("font-size").unwrap().parse().unwrap();
             assert!(height / size("width") * 8.0 / 2.54 * 72.0 > 6.0, "{height}");
             if text.attribute("transform").is_none() {

@@ -1,4 +1,4 @@
-//! SIR and data rate over the number of relays, one way and both ways.
+//! SIR and data rate by the number of relays, one way and both ways.
 
 use uav_relay_tools::figures::link::MOST_RELAYS;
 
@@ -13,7 +13,7 @@ fn the_rates_are_those_of_the_sirs_and_both_ways_cost_some() {
         let of = |name: &str| row.get(name).unwrap();
         let [one, both, judged] =
             ["one_way", "both_ways", "judged"].map(|name| of(&format!("{name}_sir_linear")));
-        // The bound of 1e-4 is that of the agreement.
+        // 1e-4 is the tolerance of the agreed SIR.
         assert!(
             judged <= both * (1.0 + 1e-4) && both < one,
             "{relays}: {one} {both} {judged}"

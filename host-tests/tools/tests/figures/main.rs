@@ -1,6 +1,6 @@
-//! Runs of `cargo figures` as a program. Each table is compared with a reference that shares no formula with the crate, or with
-//! values of a separate program.
+//! Runs of `cargo figures` as a program.
 //!
+//! Each table is compared with a reference that shares no formula with the crate, or with values of a separate program.
 //! The tool runs once, in full; the tests read its files.
 #![allow(
     clippy::unwrap_used,
@@ -110,7 +110,7 @@ fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }
 
-/// Checks that `got` lies between `want` x (1 - `least`) and `want` x (1 + `most`).
+/// Checks that `got` is between `want` x (1 - `least`) and `want` x (1 + `most`).
 #[track_caller]
 fn within(got: f64, want: f64, least: f64, most: f64) {
     assert!(

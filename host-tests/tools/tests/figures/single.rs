@@ -1,4 +1,4 @@
-//! Single relay: the equal-SIR locus, the best position by altitude, and the readings of the gain.
+//! Single relay: positions of equal SIR, the best position by altitude, and the readings of the gain.
 
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::{Link, Relay};
@@ -7,7 +7,7 @@ use uav_relay_tools::figures::single::{ALTITUDES_M, REALISATIONS};
 
 use super::{Table, off, within};
 
-/// Returns the paper's dual-hop link (its third sub-table) in the reference's form.
+/// Returns the paper's dual-hop link (third part of its table) in the reference's form.
 fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     Link {
         distance_m: 35.0,
@@ -23,7 +23,7 @@ fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     }
 }
 
-/// Returns a reference link with one relay at `altitude_m`. Tx power and interferer come from the table row `row`.
+/// Returns a reference link with one relay at `altitude_m`. Tx power and interferer are from `row`.
 fn locus_link(row: &super::Row<'_>, altitude_m: f64) -> Link {
     Link {
         distance_m: 35.0,
@@ -50,7 +50,7 @@ fn both_hops_are_equal_on_the_locus_and_nowhere_between() {
             assert!(off(sir[0], sir[1]) < 1e-4, "{sir:?} at {x}, {altitude}");
             on += 1;
         }
-        // Counts the changes of the better hop on the way up: one per altitude.
+        // The better hop changes once at each altitude of equal SIR.
         let first_is_better = |h: f64| {
             let sir = locus_link(row, h).sir_hops(&[x]);
             sir[0] > sir[1]
@@ -94,8 +94,9 @@ fn the_locus_agrees_with_the_reference() {
     }
 }
 
-/// Checks two statements about the curve of positions at which both hops of a relay have the same SIR. More Tx power
-/// moves the curve toward Rx, and an interferer nearer to the line moves it down.
+/// Checks two statements about the curve of positions of equal SIR.
+///
+/// More Tx power moves the curve toward Rx, and an interferer nearer to the line moves it down.
 #[test]
 fn the_locus_moves_as_the_text_says() {
     let table = Table::read("locus");
@@ -105,7 +106,7 @@ fn the_locus_moves_as_the_text_says() {
     };
     for x in [14.0, 20.0, 30.0] {
         for y in [30.0, 60.0] {
-            // A branch that rises with x has moved toward Rx if it is lower at the same x.
+            // A curve that rises with x has moved toward Rx if it is lower at the same x.
             assert!(upper(40.0, y, x).unwrap() < upper(20.0, y, x).unwrap());
         }
         for tx in [20.0, 40.0] {
@@ -164,9 +165,9 @@ fn mean(link: &Link, of: impl Fn(f64) -> f64) -> f64 {
     sum / f64::from(points)
 }
 
-/// Returns the chain's SIR, linear, with the relay at a position that ignores the interference.
+/// Returns the chain's SIR, linear, with the relay at the position that ignores the interference.
 ///
-/// At that position the weaker of the two received signals is as strong as possible. It is found by trying 200 001 positions.
+/// There the weaker of the two received signals is strongest. The best of 200 001 positions is taken.
 fn blind(link: &Link) -> f64 {
     let relay = link.relays[0];
     let h2 = relay.altitude_m.powi(2);
@@ -247,6 +248,6 @@ fn no_linear_definition_gives_the_papers_gain() {
         .map(|row| row.number("over_random_percent"))
         .fold(f64::INFINITY, f64::min);
     println!("least gain over random {least:.2} %");
-    // Result of an independent program over its own power ratios.
+    // Result of an independent program with other power ratios.
     assert!((least - 39.2).abs() < 0.7, "{least}");
 }

@@ -1,4 +1,4 @@
-//! Flash images. Independent readers find the bytes of the ELF at their load addresses.
+//! Flash images. Independent readers must find the bytes of the ELF at their load addresses.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::expect_used)]
 
 use std::process::{Command, Output};
@@ -34,7 +34,7 @@ fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
     file
 }
 
-/// Returns the pieces of an image: a vector table, code 70 KiB after its start, and data for RAM.
+/// Returns the parts of an image: a vector table, code 70 KiB after its start, and data for RAM.
 fn example() -> Vec<Piece> {
     let code: Vec<u8> = (0..70_000_u32).map(|at| (at % 251) as u8).collect();
     let file = elf(&[
@@ -84,7 +84,7 @@ fn a_uf2_file_has_whole_blocks_with_whole_pages() {
     let word = |block: &[u8], at: usize| u32::from_le_bytes(block[at..at + 4].try_into().unwrap());
     assert_eq!(file.len() % 512, 0);
     let count = u32::try_from(file.len() / 512).unwrap();
-    // 276 bytes take 2 pages, 70 000 bytes from a page boundary 274, and the last segment one.
+    // 276 bytes take 2 pages, 70 000 bytes from the start of a page take 274, and the last part takes one.
     assert_eq!(count, 2 + 274 + 1);
     let whole = flat(&example).unwrap().bytes;
     for (number, block) in (0..).zip(file.chunks_exact(512)) {
@@ -161,7 +161,7 @@ fn a_block_becomes_files_and_an_invalid_one_is_refused() {
     }
 }
 
-/// Checks that each board's block is outside its image, so that flashing an image keeps the block.
+/// Checks that each board's block is outside of its image, so that flashing an image keeps the block.
 #[test]
 fn a_boards_block_is_at_an_address_beyond_any_image() {
     let embassy = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/embassy");

@@ -1,4 +1,6 @@
-//! Bytes of a block against the table of `examples/block/src/lib.rs`; the block as a drone reads it.
+//! Bytes of a block, compared with the table of `examples/block/src/lib.rs`.
+//!
+//! The tests also check the block as a drone reads it.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -15,7 +17,7 @@ use uav_relay_tools::provision::config::{Config, ConfigError, LEN, MAX_POINTS};
 
 use super::{changed, example, field, in_a_field, paper, reads, with};
 
-/// Returns the expected bytes of a block of the paper's scenario with some changes, built by hand.
+/// Returns the expected bytes of a block of the paper's scenario with some changes.
 ///
 /// `method` has the number of the method, true for a fixed altitude, and the parameters of `adjust`. `band` has the
 /// lowest and the highest altitude. `noise` has the interferer, and the bytes from the number of field points on.
@@ -70,7 +72,7 @@ fn a_block_follows_the_table() {
     let block = flight.by(adjust).block(3).unwrap();
     assert_eq!(by_hand((2, true, 2.5, 0x1234), [20.0, 300.0], PAPER), block);
 
-    // Upsilon = (alpha + beta - 1) / ((alpha - 1) I_max), which for alpha = 2 is (1 + beta) / I_max.
+    // Upsilon = (alpha + beta - 1) / ((alpha - 1) I_max). For alpha = 2 this is (1 + beta) / I_max.
     let mut rest = b"\x03\0".to_vec();
     rest.extend(2e-10_f32.to_le_bytes());
     rest.extend(100_000_u32.to_le_bytes());
@@ -129,7 +131,7 @@ fn a_drone_reads_its_task_from_the_block() {
             let config = reads(&flight.block(index).unwrap()).unwrap();
             assert_eq!(config.method, method);
             assert_eq!(config.measure, None);
-            // Relay 2 has its own altitude, relay 5 only its own power.
+            // Relay 2 has its own altitude, and relay 5 only its own power.
             assert_eq!(config.hold_altitude, index == 2);
             let band = config.mission.config().band;
             assert_eq!((band.least_m, band.most_m), (40.0, 120.0));
@@ -280,7 +282,7 @@ fn a_number_out_of_range_is_named() {
             &(-0.5_f32).to_le_bytes(),
             ConfigError::Mission(MissionError::Lateral),
         ),
-        // Without adjust, without measurements and without a field.
+        // Values of a block without adjust, measurements and field.
         (108, &1.0_f32.to_le_bytes(), ConfigError::Adjust),
         (108, &(-0.0_f32).to_le_bytes(), ConfigError::Adjust),
         (112, &[1, 0], ConfigError::Adjust),
@@ -291,11 +293,11 @@ fn a_number_out_of_range_is_named() {
         (120, &[100, 0], ConfigError::Measure),
         (124, &[1], ConfigError::Unused),
         (251, &[0x80], ConfigError::Unused),
-        // Without locating the interferer.
+        // Values of a block that does not locate an interferer.
         (352, &[1], ConfigError::Listen),
         (360, &[1], ConfigError::Listen),
         (368, &0.1_f32.to_le_bytes(), ConfigError::Listen),
-        // Without sites.
+        // Values of a block without sites.
         (312, &1.0_f32.to_le_bytes(), ConfigError::Speed),
         (312, &(-0.0_f32).to_le_bytes(), ConfigError::Speed),
     ] {
@@ -305,8 +307,9 @@ fn a_number_out_of_range_is_named() {
     assert_eq!(reads(&[0; LEN]), Err(ConfigError::Blank));
 }
 
-/// Checks the allowed ranges of `explore`, `rounds`, `i_max_w` and `samples`. Values just outside must be rejected,
-/// values just inside accepted.
+/// Checks the ranges of `explore`, `rounds`, `i_max_w` and `samples`.
+///
+/// Values just outside must be rejected, and values just inside accepted.
 #[test]
 fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
     for (explore_m, rounds, good) in [
@@ -365,7 +368,7 @@ fn a_field_out_of_range_is_named() {
         (52, &one, ConfigError::Interferer),
         (114, &[2, 0], ConfigError::Unused),
         (114, &[4, 0], ConfigError::Field(FieldError::Order)),
-        // Zero points mean an interferer, so the points' bytes must be 0.
+        // Without points the block has an interferer, so the bytes of the points must be 0.
         (114, &[0, 0], ConfigError::Unused),
         (114, &[17, 0], ConfigError::Points),
         (124, &nan, ConfigError::Field(FieldError::Place)),
@@ -422,7 +425,7 @@ fn fitted_slots_are_stored_for_joint_only() {
     assert_eq!(equal[384..388], [0; 4]);
     let by_align = reads(&changed(block, 14, &[0]));
     assert_eq!(by_align, Err(ConfigError::Fitted));
-    // A relay that listens may have no known interferer.
+    // Fitted slots need a known interferer.
     let sensing = [5_000_000_u64.to_le_bytes(), 60_000_000_u64.to_le_bytes()].concat();
     let sensing = [sensing, 0.03_f32.to_le_bytes().to_vec()].concat();
     let listening = changed(block, 352, &sensing);
@@ -516,7 +519,7 @@ fn any_bytes_are_a_configuration_or_an_error() {
         for _ in 0..20_000 {
             let at = rng.random_range(8..LEN - 8);
             let bytes: [u8; 4] = rng.random();
-            // Four random bytes, or one, which is valid more often.
+            // Four random bytes or one; one random byte is valid more often.
             let cut = if rng.random() { 1 } else { 4 };
             if let Ok(config) = reads(&changed(block, at, &bytes[..cut])) {
                 flies(&config);

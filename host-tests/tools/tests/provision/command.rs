@@ -112,7 +112,7 @@ fn errors_are_reported_in_one_line() {
     assert!(!folder.path().join("block.bin").exists());
 }
 
-/// Checks that relays that overload their radio channel are refused, with the numbers in the error.
+/// Checks that too many relays for their radio channel are refused, with the numbers in the error.
 ///
 /// At the firmware's data rate a channel carries 25 relays.
 #[test]
@@ -246,7 +246,7 @@ fn the_block_has_the_networks_method_and_baud() {
 
 /// Checks that a wrong UDP address of the autopilot is reported, although the firmware has no UDP.
 ///
-/// The scenario file may be shared with companion computers.
+/// Companion computers may use the same scenario file.
 #[test]
 fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -288,7 +288,7 @@ fn names(dir: &Path) -> BTreeSet<String> {
         .collect()
 }
 
-/// Checks that relay `index`'s block in `dir` matches the plan, and that the summary lists the relay.
+/// Checks that relay `index`'s block in `dir` matches the plan, and that the summary has the relay.
 fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
     let plan = scenario.plan.as_ref().unwrap();
     let block: Block = std::fs::read(dir.join(format!("relay{index}.bin")))
@@ -301,7 +301,7 @@ fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
     assert_eq!(config.method, Method::Align);
     assert!(config.sites.is_some());
     assert_eq!(secret(&block).unwrap().map(|secret| secret.epoch), Some(77));
-    // The summary has the relay's position on the line and on earth, and the command for its file.
+    // The summary has the relay's x, y, latitude and longitude, and the command for its file.
     let place = plan.places[usize::from(index) - 1];
     let row = summary
         .lines()
@@ -384,7 +384,7 @@ fn a_plan_is_written_to_every_block() {
     }
     assert!(!summary.contains("0123456789abcdef"));
 
-    // Existing blocks stay without --force; with it nothing of a larger flight remains.
+    // Without --force existing blocks stay. With it all blocks of a larger flight are removed.
     let again = refusal(words);
     assert!(
         again.contains("relay1.bin exists already; --force"),
@@ -433,7 +433,7 @@ fn a_joint_plan_sets_the_joint_method() {
 fn all_or_none_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("blocks");
-    // A block that no drone accepts: a field with more points than it can hold.
+    // This block is refused: the field has more points than a block can hold.
     let points = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
         .map(|x| format!("{{ x_m = {x}, alpha = 3, beta = 2 }}"))
         .join(", ");
@@ -450,7 +450,7 @@ fn all_or_none_is_written() {
     let line = refusal(&wide);
     assert!(line.contains("a drone's block holds at most 16"), "{line}");
     assert!(!dir.exists());
-    // A folder with the name of a block cannot be replaced: files renamed before are removed again.
+    // A folder named like a block cannot be replaced. Files that were renamed before are removed again.
     std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
     let line = refusal(&format!(
         "--uavs 3 --all --out-dir {} --force",
@@ -511,7 +511,7 @@ fn conflicting_options_are_reported_in_one_line() {
 
 /// Checks that a hypothetical interferer that costs too much SIR is refused.
 ///
-/// The error states the loss against the planner's best positions.
+/// The error states the loss compared with the planner's best positions.
 #[test]
 fn a_poor_hypothetical_interferer_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -544,7 +544,7 @@ fn a_poor_hypothetical_interferer_is_refused() {
         let line = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success() && line.contains(&words), "{line}");
     }
-    // Two interferers next to each other lose nothing.
+    // Two interferers close together cost nothing.
     let near = std::fs::read_to_string(&several).unwrap();
     let near = near
         .replace("x_m = 200.0", "x_m = 790.0")
@@ -577,7 +577,7 @@ fn the_printed_next_command_accepts_the_file() {
     std::fs::write(&scenario, &drone).unwrap();
     write_key(&key, &"0123456789abcdef".repeat(4));
     let arguments = format!("--scenario {mine} --uavs 3 --out {planned_file}");
-    // The published example is for Linux computers.
+    // The example in the repository is for Linux computers.
     let said = planned(&arguments);
     assert!(
         said.contains("network.baud = 57600: must be 115200"),
@@ -594,7 +594,7 @@ fn the_printed_next_command_accepts_the_file() {
         text(&dir)
     ));
     assert!(line.contains("network.baud = 57600"), "{line}");
-    // For the firmware the last line is a command that succeeds.
+    // For the firmware the last line is a command. It must succeed.
     std::fs::write(&scenario, for_the_firmware(&drone)).unwrap();
     let said = planned(&format!("{arguments} --force"));
     let command = said.lines().last().unwrap().trim();
@@ -626,7 +626,7 @@ fn a_plan_and_a_network_of_different_sizes_are_refused() {
         );
         assert!(!Path::new(&file).exists());
     }
-    // A file edited by hand.
+    // This file was edited by hand.
     planned(&format!("--scenario {scenario} --uavs 4 --out {file}"));
     let four = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&scenario, four.replace("relays = 4", "relays = 6")).unwrap();

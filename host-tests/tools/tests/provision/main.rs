@@ -1,4 +1,6 @@
-//! Configuration of a drone. `cargo provision` writes it, the firmware's own code reads it, and damaged blocks are rejected.
+//! Configuration of a drone.
+//!
+//! `cargo provision` writes it, the firmware's own code reads it, and damaged blocks are rejected.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -48,7 +50,7 @@ fn field(points: usize) -> Block {
     flight.block(3).unwrap()
 }
 
-/// Writes a file with the key `key`, which only its owner can read.
+/// Writes a file with the key `key` that only its owner can read.
 fn write_key(file: impl AsRef<Path>, key: &str) {
     use std::os::unix::fs::PermissionsExt as _;
     std::fs::write(&file, key).unwrap();
@@ -59,7 +61,7 @@ fn reads(block: &Block) -> Result<Config, ConfigError> {
     read(block, Box::leak(Box::new(EMPTY)))
 }
 
-/// Returns the block of the paper's scenario with `bytes` written at offset `at`, and a matching CRC.
+/// Returns the block of the paper's scenario with `bytes` at the offset `at`, and a matching CRC.
 fn with(at: usize, bytes: &[u8]) -> Block {
     changed(paper(), at, bytes)
 }
@@ -83,7 +85,7 @@ fn provision(arguments: &str) -> Output {
         .unwrap()
 }
 
-/// Runs `provision`, checks that it exits with status 2, and returns its one error line.
+/// Runs `provision`, checks that it exits with status 2, and returns its error line.
 fn refusal(arguments: &str) -> String {
     let output = provision(arguments);
     let text = String::from_utf8(output.stderr).unwrap();

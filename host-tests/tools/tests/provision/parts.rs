@@ -1,4 +1,4 @@
-//! Key and epoch in a block, and their source.
+//! Key and epoch in a block, and their sources.
 
 use std::path::Path;
 
@@ -141,7 +141,7 @@ fn a_key_file_that_others_can_read_is_refused() {
         (0o666, false),
         (0o600, true),
         (0o400, true),
-        // A service reads it through its group.
+        // A service reads the file through its group.
         (0o640, true),
     ] {
         std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
@@ -174,7 +174,7 @@ pub(super) fn flight() -> Flight {
     Flight::new(&scenario(), 5, 1e-4, 7).unwrap()
 }
 
-/// Latitude (1e-7 deg), longitude (1e-7 deg) and height (mm) of Tx and Rx, as a block has them.
+/// Positions of Tx and Rx as in a block: latitude and longitude, 1e-7 degrees, and height, mm.
 const ENDS: [[i32; 3]; 2] = [
     [474_000_000, 85_400_000, 420_000],
     [474_100_000, 85_500_000, 431_000],
@@ -257,7 +257,7 @@ fn errors_of_sites_are_named() {
         course(&near, flight().mission()),
         Err(CourseError::Axis(AxisError::TooShort { .. }))
     ));
-    // The error occurs when the block is written, before the drone would report it.
+    // The error occurs when the block is written, and not only when a drone reads it.
     let moved = Scenario {
         distance_m: 1_340.0,
         ..scenario()
@@ -412,13 +412,13 @@ fn the_ranges_are_those_of_a_relay() {
             Err(ConfigError::Listen)
         };
         assert_eq!(reads(&block).map(|config| config.listen), expected);
-        // Not allowed in a field.
+        // This is not allowed in a field.
         let block = changed(field(2), 352, &block[352..372]);
         assert_eq!(reads(&block), Err(ConfigError::Listen));
     }
 }
 
-/// Checks that locating an interferer is refused if the scenario gives the interference along the line.
+/// Checks that `[listen]` is refused if the scenario gives the interference along the line Tx-Rx.
 #[test]
 fn a_field_is_refused_with_listening() {
     let mut scenario = super::in_a_field(3);

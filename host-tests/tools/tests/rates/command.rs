@@ -4,7 +4,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// Writes a scenario file: the default one with `rx_w` as power of Rx, W, and the section `[link]`.
+/// Writes the default scenario file with `rx_w` as the power of Rx, W, and the section `[link]`.
 fn scenario(rx_w: f64, link: &str) -> tempfile::NamedTempFile {
     let file = tempfile::NamedTempFile::new().unwrap();
     let powers = format!("uav_w = 1.0\nrx_w = {rx_w:?}\n");
@@ -36,7 +36,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value}"))
 }
 
-/// Returns the SIRs of all hops in a report, linear: in the direction to Rx, then in that to Tx.
+/// Returns the linear SIRs of all hops in a report: in the direction to Rx, and in the direction to Tx.
 fn sirs(report: &Value) -> [Vec<f64>; 2] {
     [("sir", "rx_sir"), ("sir_back", "rx_sir_back")].map(|(of, of_rx)| {
         let relays = report["relays"].as_array().unwrap().iter();
@@ -66,7 +66,7 @@ fn relays_are_planned_for_both_directions_on_request() {
         assert!(sir > 1.2 * both(&one_way), "{report} {one_way}");
         assert!(sir < number(&one_way["sir"]), "{report} {one_way}");
         assert_eq!(number(&report["reverse"]), reverse);
-        // The bound of intervals proves it.
+        // It is proven by interval arithmetic (`plan::bound`).
         assert_eq!(report["proven"], true, "{report}");
         let how = if uavs == 1 {
             "the optimum of one relay for both directions"
@@ -114,7 +114,7 @@ fn both_directions_are_in_the_table_and_in_the_picture() {
         assert!(table.contains(&format!(" {back:.3}\n")), "{table}");
     }
     assert!(picture.contains("At hops: SIR to Rx / back, dB"));
-    // One way: as before.
+    // For one direction the table has no column for the way back.
     let one_way = text(&scenario(5.0, "reverse = 0.0"), "--uavs 3");
     assert!(!one_way.contains("SIR back"), "{one_way}");
 }
@@ -151,7 +151,7 @@ fn data_rates_count_both_directions() {
         let best = rates.iter().map(worse).fold(0.0, f64::max);
         let named = number(&report["best_rate_bps"]);
         assert!(named <= best && named > 0.9998 * best, "{report}");
-        // The fewest relays that carry a target to Rx, and half of it back.
+        // The fewest relays that carry a target rate to Rx, and half of it back.
         let file = scenario(5.0, &link);
         let target = 0.999 * best;
         let met = json(&file, &format!("--target-rate-bps {target:?}"));
@@ -201,7 +201,7 @@ fn what_has_no_way_back_is_refused_by_name() {
     assert!(line.contains("link.reverse"), "{line}");
 }
 
-/// Checks plans for both directions, with several interferers and with interference given along x.
+/// Checks plans for both directions, with several interferers and with a field of interference.
 #[test]
 fn several_interferers_and_fields_are_planned_both_ways() {
     let several = scenario(
@@ -237,7 +237,7 @@ fn several_interferers_and_fields_are_planned_both_ways() {
     }
 }
 
-/// Checks that a plan has the fitted slots of every hop, in order, and as long as the hop needs.
+/// Checks that a plan has the fitted slot of every hop, in order, and as long as the hop needs.
 #[test]
 fn fitted_slots_of_every_hop_are_in_the_plan() {
     for (reverse, options) in [
@@ -292,9 +292,9 @@ fn fitted_slots_of_every_hop_are_in_the_plan() {
     assert_eq!(equal["hop_slots"], Value::Null);
 }
 
-/// Checks that `--out` accepts or refuses a plan by its data rate: fitted slots, several interferers.
+/// Checks that `--out` accepts or refuses plans with fitted slots by their data rate.
 ///
-/// Fitted slots are as long as each hop needs.
+/// The scenario has several interferers. A fitted slot is as long as its hop needs.
 #[test]
 fn plans_in_fitted_slots_against_several_interferers_are_written_by_their_rate() {
     let folder = tempfile::tempdir().unwrap();
@@ -325,7 +325,7 @@ fn plans_in_fitted_slots_against_several_interferers_are_written_by_their_rate()
     assert!(!out.exists());
 }
 
-/// Checks that requests are refused if relays would not fly the planned positions.
+/// Checks that requests are refused if relays would not fly to the planned positions.
 #[test]
 fn wrong_requests_for_fitted_slots_and_free_altitudes_are_named() {
     let link = "access = \"fitted\"\nbandwidth_hz = 1e6";
@@ -356,7 +356,7 @@ fn wrong_requests_for_fitted_slots_and_free_altitudes_are_named() {
 
 /// Checks that fitted slots with free altitudes are planned by the relays' own method.
 ///
-/// No number of relays is then proven to be the best one.
+/// No number of relays is proven to be the best one.
 #[test]
 fn fitted_slots_with_free_altitudes_are_planned_as_on_board() {
     for reverse in [0.0, 0.5, 1.0] {
@@ -379,7 +379,7 @@ fn fitted_slots_with_free_altitudes_are_planned_as_on_board() {
     }
 }
 
-/// Checks that the list of rates with free altitudes has the rates of single plans, in both directions.
+/// Checks that the list of rates with free altitudes equals the rates of single plans.
 #[test]
 fn rates_with_free_altitudes_are_those_of_the_plans() {
     for access in ["slots", "fitted"] {

@@ -1,48 +1,51 @@
-//! Judge of data rates: dynamic programming on its own grid in f64, then one relay after the other. It shares no code
-//! with the planner or the crate.
+//! Independent computation of the best data rates.
+//!
+//! It uses dynamic programming on its own grid in f64, and then moves one relay after the other. It shares no code with
+//! the planner or the crate.
 
-/// Relation of a hop's SINR to its bit/s/Hz, for the independent computation of rates.
+/// Data rate of a hop by its SINR, bit/s/Hz.
 #[derive(Debug, Clone)]
 pub(crate) enum Model {
-    /// Shannon's formula log2(1 + SINR / gap); the value is the gap, linear.
+    /// Shannon's formula log2(1 + SINR / gap). The field is the gap, linear.
     Gap(f64),
-    /// Rate steps of a radio, each with its least SINR, linear, and its bit/s/Hz.
+    /// Rate steps of a radio: least SINR, linear, and bit/s/Hz of each.
     Steps(Vec<(f64, f64)>),
 }
 
-/// Independent model of a chain and its data rate, for comparison with the planner. All relays are at one altitude
-/// above the line from Tx to Rx.
+/// Independent model of a chain and its data rate. All relays have one altitude, and y = 0.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     /// Distance from Tx to Rx, m.
     pub(crate) distance_m: f64,
     /// Common altitude of the relays, m.
     pub(crate) altitude_m: f64,
-    /// Least distance between neighbouring relays along the line, m.
+    /// Least distance between neighbouring relays along x, m.
     pub(crate) apart_m: f64,
     /// Transmit powers of Tx, of the relays in order, and of Rx, W.
     pub(crate) powers_w: Vec<f64>,
     /// Interferer: its power in W, and its x and y in m.
     pub(crate) interferer: [f64; 3],
-    /// Path-loss factors, 1/m^2: of links with a drone at one or both ends, and of links on the ground.
+    /// Path-loss factors, 1/m^2: of links with a drone, and of links on the ground.
     pub(crate) loss: [f64; 2],
     /// Noise power of every receiver, W.
     pub(crate) noise_w: f64,
-    /// Required data rate from Rx to Tx, as a fraction of the data rate from Tx to Rx; 0 for one direction.
+    /// Required data rate to Tx, as a fraction of the data rate to Rx; 0 for one direction.
     pub(crate) reverse: f64,
-    /// True if each time slot is as long as its hop needs; false if all slots are equally long.
+    /// True if each time slot is as long as its hop needs; false for equal slots.
     pub(crate) fitted: bool,
-    /// Relation of a hop's SINR to its bit/s/Hz.
+    /// Data rate of a hop by its SINR.
     pub(crate) model: Model,
 }
 
-/// Number of equidistant grid points along the whole line. The grid has additional dense points near Tx, Rx and the interferer.
+/// Number of equidistant grid points between Tx and Rx.
+///
+/// The grid has further points near Tx, Rx and the interferer.
 const EVEN: usize = 171;
 
-/// Number of equal cells of the line whose edges the search tries, too, for a radio with rate steps.
+/// Number of equal cells between Tx and Rx whose edges are also tried, for a radio with rate steps.
 const CELLS: usize = 400;
 
-/// Maximum number of chains that each cell keeps in the search for a radio with rate steps.
+/// Largest number of chains that each cell keeps, for a radio with rate steps.
 const KEPT: usize = 4;
 
 /// Inverse of the golden ratio, for golden-section search.
@@ -112,8 +115,7 @@ impl Chain {
 
     /// Returns the time for one bit of a chain with relays at `x`, m, in units of 1 / bandwidth.
     ///
-    /// If each time slot is as long as its hop needs, the time is the sum over all hops; otherwise it is the time of
-    /// the slowest hop.
+    /// With fitted slots it is the sum over all hops, otherwise the time of the slowest hop.
     fn total(&self, x: &[f64]) -> f64 {
         let last = x.len() + 1;
         let mut from = 0.0;
@@ -127,8 +129,7 @@ impl Chain {
 
     /// Returns the data rate of a chain with relays at `x`, m, in bit/s/Hz.
     ///
-    /// For both directions the result is the smaller of two values: the rate to Rx, and the rate to Tx divided by
-    /// `reverse`.
+    /// For both directions it is the smaller of two rates: to Rx, and to Tx divided by `reverse`.
     pub(crate) fn rate(&self, x: &[f64]) -> f64 {
         self.rate_of(self.total(x), x.len())
     }
@@ -141,7 +142,7 @@ impl Chain {
         }
     }
 
-    /// Returns the same chain with only its first `relays` relays.
+    /// Returns the chain with only the first `relays` relays.
     pub(crate) fn with(&self, relays: usize) -> Self {
         let mut powers_w = self.powers_w[..=relays].to_vec();
         powers_w.extend(self.powers_w.last());
@@ -153,7 +154,7 @@ impl Chain {
 
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
-        // Denser toward both ends.
+        // The points are denser toward both ends.
         let even = (0..EVEN).map(|i| {
             let t = i as f64 / (EVEN - 1) as f64;
             d * (0.5 * t + 0.5 * t * t * (3.0 - 2.0 * t))
@@ -170,8 +171,9 @@ impl Chain {
         points
     }
 
-    /// Returns the x of the relays with the largest rate on the grid. There is a list for each number of relays from
-    /// 1.
+    /// Returns the x of the relays with the largest rate on the grid.
+    ///
+    /// There is a list for each number of relays from 1.
     fn on_grid(&self) -> Vec<Vec<f64>> {
         let grid = self.grid();
         let never = usize::MAX - 1;
@@ -210,12 +212,12 @@ impl Chain {
         all
     }
 
-    /// Returns the x of the relays with the largest rate, m, for a radio with rate steps. There is a list of x for each
-    /// number of relays from 1.
+    /// Returns the x of the relays with the largest rate for a radio with rate steps, m.
     ///
-    /// The search extends chains from Tx relay by relay. For each cell of a grid it keeps the few unfinished chains
-    /// with the least times that end in this cell, and of two with equal times the chain that ends farther from Tx. The
-    /// next relay is tried at all grid points, and at all x, found by bisection, where the time of the hop changes.
+    /// There is a list of x for each number of relays from 1. The search extends chains from Tx relay by relay. Each
+    /// cell of a grid keeps the few unfinished chains with the least times that end there; of equal times, the chain
+    /// that ends farther from Tx. The next relay is tried at all grid points, and at all x at which the time of the hop
+    /// changes.
     fn by_changes(&self) -> Vec<Vec<f64>> {
         let mut grid = self.grid();
         grid.extend((0..=CELLS).map(|i| self.distance_m * i as f64 / CELLS as f64));
@@ -281,8 +283,9 @@ impl Chain {
         all
     }
 
-    /// Returns the x of the relays with the largest rate that the searches find. There is a list for each number of
-    /// relays from 1. The searches need no initial positions.
+    /// Returns the x of the relays with the largest rate found.
+    ///
+    /// There is a list for each number of relays from 1. No initial positions are needed.
     fn searched(&self) -> Vec<Vec<f64>> {
         let mut all = self.on_grid();
         if self.fitted && matches!(self.model, Model::Steps(_)) {
@@ -296,8 +299,9 @@ impl Chain {
         all
     }
 
-    /// Improves the x of the relays, which begin at `start`, by golden-section search. The search moves groups of one
-    /// to four neighbouring relays together.
+    /// Improves the x of the relays, from `start` on, by golden-section search.
+    ///
+    /// It moves groups of one to four neighbouring relays together.
     fn improved(&self, start: &[f64]) -> Vec<f64> {
         let mut x = start.to_vec();
         let mut best = self.total(&x);
@@ -337,8 +341,9 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rates that two independent searches find with all relays, bit/s/Hz. The first starts
-    /// from its own grid, the second search also starts from the x `others`, m.
+    /// Returns the largest data rates of all relays that two searches find, bit/s/Hz.
+    ///
+    /// The first search starts from its own grid. The second also starts from the x `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {
         let grid = self.searched();
         let starts = [grid.last().unwrap().as_slice(), others];
@@ -346,7 +351,7 @@ impl Chain {
         [rates[0], rates[0].max(rates[1])]
     }
 
-    /// Returns the largest data rate found with any number of relays, bit/s/Hz, and that number.
+    /// Returns the largest data rate found with any number of relays, bit/s/Hz, and this number.
     pub(crate) fn best_number(&self) -> (f64, usize) {
         let grid = self.searched();
         let mut starts: Vec<&Vec<f64>> = grid.iter().collect();

@@ -1,6 +1,7 @@
-//! Plans for both directions and for data rates. Positions are compared with an independent dynamic program.
+//! Plans for both directions and for data rates.
 //!
-//! `COUNT` and `SEED` in the environment set the number of scenes and the first seed.
+//! The positions are compared with an independent dynamic program. `COUNT` and `SEED` in the environment set the number
+//! of scenes and the first seed.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -23,13 +24,12 @@ use uav_relay_tools::plan::{Number, PlanRequest, plan};
 
 use judge::{Chain, Model};
 
-/// Relative tolerance of the SIR that the tests request from the planner.
+/// Relative tolerance of the SIR in requests to the planner.
 const TOLERANCE: f64 = 1e-5;
 
-/// Bandwidth of the data link in the tests, Hz.
 const BANDWIDTH_HZ: f64 = 1e6;
 
-/// Largest number of relays that the independent search of the tests computes.
+/// Largest number of relays that the independent computation tries.
 const MOST: usize = 24;
 
 fn number(name: &str, default: u64) -> u64 {
@@ -145,7 +145,7 @@ fn as_good_as_the_judge(access: Access, has_steps: bool) {
         let x: Vec<f64> = ours.places.iter().map(|(at, _)| at.x_m.into()).collect();
         let rate = Rate::of(&ours, &scenario, &radio).worse(scenario.reverse) / BANDWIDTH_HZ;
         let own = chain.rate(&x);
-        // A step of a radio may depend on the last digit.
+        // With rate steps the rate may depend on the last digit of a position.
         assert!(
             has_steps || (rate / own - 1.0).abs() < 1e-6,
             "SEED={seed}: {rate} {own}"
@@ -154,7 +154,7 @@ fn as_good_as_the_judge(access: Access, has_steps: bool) {
         if best > 0.0 {
             let share = rate / best;
             worst = worst.min(share);
-            // The judge itself falls short of positions that the planner found.
+            // Alone, the independent search can miss positions that the planner finds.
             least_of_judge = least_of_judge.min(alone / best);
             missed += u32::from(alone < 0.999 * best);
             if alone < 0.999 * best {
@@ -171,7 +171,7 @@ fn as_good_as_the_judge(access: Access, has_steps: bool) {
                 );
             }
         }
-        // The number of relays, too. The judge knows no other powers for more of them.
+        // Also compares the best number of relays. The independent computation needs equal powers for this.
         if seed % 3 == 0 && scenario.relays.is_empty() {
             let mut all = chain.clone();
             let rx_w = all.powers_w.pop().unwrap();

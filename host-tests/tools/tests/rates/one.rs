@@ -6,8 +6,9 @@ use uav_relay_scenario::scene::{Relay, Scene};
 use uav_relay_scenario::{Scenario, Source};
 use uav_relay_tools::plan::one_both_ways::best;
 
-/// Returns the smallest of the four SIRs of a relay at `x`, linear: of both hops in both directions. An SIR toward Tx
-/// is first divided by `reverse`.
+/// Returns the smallest of the four linear SIRs of a relay at `x`: of both hops in both directions.
+///
+/// An SIR toward Tx is first divided by `reverse`.
 fn worst(scene: &Scene, reverse: f64, x: f64) -> f64 {
     let places = [(x, scene.relays[0].altitude_m)];
     let least = |sirs: Vec<f64>| sirs.into_iter().fold(f64::INFINITY, f64::min);

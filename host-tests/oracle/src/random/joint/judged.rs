@@ -1,4 +1,4 @@
-//! Two thousand scenarios in space with stored optima. A solver is tested without searching for them again.
+//! Random scenarios with stored optima, so that a test of a solver need not search for them again.
 
 use std::io;
 
@@ -10,22 +10,22 @@ use super::{Scenario, in_space};
 /// Number of random scenarios whose optimum is stored.
 pub const COUNT: u32 = 2000;
 
-/// File with the stored optima. Comments at its beginning name their origin.
+/// File with the stored optima. Its first lines name their origin.
 const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
 
 const SEED: u64 = 2021;
 
-/// Returns the random scenario with the number `number`, below [`COUNT`]. The scenario has 1 to 100 relays; its numbers are rounded to f32.
+/// Returns the random scenario `number`, below [`COUNT`]. It has 1 to 100 relays, and f32 numbers.
 pub fn numbered(number: u32) -> Scenario {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     rng.set_stream(number.into());
     in_space(&mut rng, &(1..=100)).as_relays_know_it()
 }
 
-/// Returns the stored optimum SIR (linear) of each scenario, by number; 0 if no chain is possible.
+/// Returns the optimum SIR (linear) of each scenario by number; 0 if no chain is possible.
 ///
 /// # Errors
-/// If the file cannot be read, or a row is not a scenario's number and an SIR.
+/// If the file cannot be read, or if a row is not a scenario's number and an SIR.
 pub fn optima() -> io::Result<Vec<f64>> {
     let mut optima = Vec::new();
     for row in csv::ReaderBuilder::new()

@@ -1,4 +1,4 @@
-//! Random scenarios of the joint problem, in which relays choose their altitudes within a band.
+//! Random scenarios of the joint problem: relays choose their altitudes within a range.
 //!
 //! | quantity | distribution |
 //! | --- | --- |
@@ -14,16 +14,17 @@
 //! | channel | 50 % the paper's (2 GHz) with eta = `mu_los`; else `mu_los` = 1, `mu_nlos` log-uniform 1 to 100, eta log-uniform from 1 to the lesser of 10 and `mu_nlos` |
 //! | minimum separation | half 0; else log-uniform 0.01 to 0.1 times D / (N + 1), or 0.03 to 0.3 where asked for |
 //!
-//! Weighted toward scenarios in which altitudes of their own help: Tx is seldom so loud that hop 1 does not matter, and the
-//! interferer is often close to the axis. In about a third the best chain is more than 1 % better than the best common altitude.
+//! In many scenarios relays gain by different altitudes: Tx is seldom so strong that the first hop does not matter, and
+//! the interferer is often close to the line Tx-Rx. In about a third the best chain is more than 1 % better than the
+//! best chain at a common altitude.
 //!
-//! [`in_space`] draws what lies to the side as well:
+//! [`in_space`] also draws lateral positions and limits:
 //!
 //! | quantity | distribution |
 //! | --- | --- |
-//! | Y | the above with either sign |
-//! | sides | a third: none; else left and right apart: 15 % none; else log-uniform 0.005 D to 0.4 D |
-//! | band | with sides, 15 %: the lowest altitude alone |
+//! | Y | as above, with either sign |
+//! | lateral limits | a third: both 0; else left and right independently: 15 % 0; else log-uniform 0.005 D to 0.4 D |
+//! | altitudes | with lateral limits, 15 %: only the lowest altitude |
 //! | minimum separation | half as in [`ROOMY`], half as in [`CROWDED`] |
 //!
 //! [`with_own`] lets relays differ:
@@ -31,7 +32,7 @@
 //! | quantity | distribution |
 //! | --- | --- |
 //! | powers | in half of the scenarios, for each relay 15 %: log-uniform 0.3 to 3 times the common one |
-//! | held | in half of the scenarios, for each relay 10 %: any place in the cross-section, uniform |
+//! | fixed relays | in half of the scenarios, for each relay 10 %: y and altitude uniform within the limits |
 
 pub mod judged;
 
@@ -45,16 +46,16 @@ use crate::reference::joint::{Corridor, FixedCrossSection};
 use crate::reference::{Link, Relay};
 use uav_relay_scenario::number::narrow;
 
-/// Random link, and the corridor in which the relays of the link choose positions.
+/// Random link, and the corridor in which its relays choose positions.
 ///
-/// The corridor limits altitude and lateral position. In the link all relays are at the corridor's lowest altitude.
+/// The corridor limits altitude and lateral position. In the link all relays are at the lowest altitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Chain of relays with Tx, Rx and interferer.
     pub link: Link,
     /// Altitudes and lateral positions that the relays may choose.
     pub corridor: Corridor,
-    /// Relays with a fixed lateral position and altitude.
+    /// Relays whose lateral position and altitude are fixed.
     pub held: Vec<FixedCrossSection>,
 }
 
@@ -81,19 +82,20 @@ impl Scenario {
     }
 }
 
-/// Range of minimum separations that hardly ever limit a chain, as fractions of the equal spacing.
+/// Range of minimum separations that seldom limit a chain, as fractions of the equal spacing.
 ///
-/// The equal spacing of N relays is D / (N + 1), with D the distance from Tx to Rx.
+/// The equal spacing of N relays is D / (N + 1); D is the distance from Tx to Rx.
 pub const ROOMY: (f64, f64) = (0.01, 0.1);
 
 /// Range of minimum separations that often limit a chain, as fractions of the equal spacing.
 ///
-/// The equal spacing of N relays is D / (N + 1), with D the distance from Tx to Rx. The separation lowers the optimum
-/// SIR in about a tenth of these scenarios.
+/// The equal spacing of N relays is D / (N + 1); D is the distance from Tx to Rx. In about a tenth of these scenarios
+/// the minimum separation lowers the optimum SIR.
 pub const CROWDED: (f64, f64) = (0.03, 0.3);
 
-/// Draws a random scenario; the distribution is in the module's table. `relays` is a range within 1 to 1000, `apart`
-/// is [`ROOMY`] or [`CROWDED`].
+/// Draws a random scenario by the module's first table.
+///
+/// `relays` is a range within 1 to 1000; `apart` is [`ROOMY`] or [`CROWDED`].
 pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f64)) -> Scenario {
     let d = log_uniform(rng, 100.0, 1e4);
     let n = count(rng, relays);
@@ -138,8 +140,9 @@ pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f
     }
 }
 
-/// Draws a random scenario with a lateral range. The distribution is in the module's second table; `relays` is within
-/// 1 to 1000.
+/// Draws a random scenario with lateral positions, by the module's second table.
+///
+/// `relays` is a range within 1 to 1000.
 pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     let apart = if rng.random() { ROOMY } else { CROWDED };
     let mut drawn = scenario(rng, relays, apart);
@@ -162,10 +165,9 @@ pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     drawn
 }
 
-/// Changes a scenario so that its relays differ. Some relays get their own power; for some the lateral position and
-/// altitude are fixed.
+/// Returns the scenario with relays that differ, as in the module's last table.
 ///
-/// The distribution is in the module's last table.
+/// Some relays get their own power. For some relays the lateral position and altitude are fixed.
 #[must_use]
 pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
     let (powers, holds): (bool, bool) = (rng.random(), rng.random());
@@ -211,7 +213,7 @@ fn along(rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// Draws the interferer's distance from the line Tx-Rx, as a fraction of the distance from Tx to Rx.
+/// Draws the interferer's distance from the line Tx-Rx, as a fraction of the distance Tx-Rx.
 fn aside(rng: &mut impl Rng) -> f64 {
     if rng.random_bool(0.7) {
         log_uniform(rng, 0.003, 0.1)

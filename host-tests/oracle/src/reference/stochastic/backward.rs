@@ -1,4 +1,4 @@
-//! Chains built from Rx toward Tx with hops as long as a target allows. The paper's Algorithm 4 and its optimum.
+//! Chains built from Rx toward Tx with the longest hops that a target allows: the paper's Algorithm 4.
 
 use super::link::StochasticLink;
 use crate::reference::link::Relay;
@@ -6,19 +6,20 @@ use crate::reference::link::Relay;
 /// Chain of relays built from Rx back toward Tx, and the target SIR that it meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backward {
-    /// Target SIR (linear). Every hop except the first is as long as this target allows.
+    /// Target SIR (linear). Every hop but the first is as long as the target allows.
     pub gamma: f64,
     /// Positions of the relays from Tx to Rx, m.
     pub places: Vec<f64>,
-    /// Number of target SIRs tried, including the final one. In the result of [`StochasticLink::fewest`] it is the
-    /// number of relays.
+    /// Number of target SIRs tried, with the last one.
+    ///
+    /// [`StochasticLink::fewest`] returns the number of relays here.
     pub iterations: usize,
 }
 
 impl StochasticLink {
     /// Returns the expected SIR (linear) at Rx with the last relay straight above Rx.
     ///
-    /// It is an upper bound for every chain; Algorithm 4 starts with this target.
+    /// It is an upper bound for every chain, and the first target of Algorithm 4.
     pub fn ceiling(&self) -> f64 {
         self.relays.last().map_or(0.0, |tail| {
             tail.power_w * self.upsilon_at(self.distance_m)
@@ -26,16 +27,16 @@ impl StochasticLink {
         })
     }
 
-    /// Returns the positions, m, of the chain built backward from Rx. Every hop but the first is as long as the
-    /// target SIR `gamma` allows; no relay is before Tx.
+    /// Returns the positions, m, of the chain built from Rx back to Tx for the target SIR `gamma`.
     ///
-    /// `None` if even the shortest hop misses the target.
+    /// Every hop but the first is as long as `gamma` allows; no relay is before Tx. `None` if even the shortest hop
+    /// misses the target.
     pub fn backward(&self, gamma: f64) -> Option<Vec<f64>> {
         let tail = self.relays.last()?;
         let d = self.distance_m;
         let reach = |power: f64, factor: f64, upsilon: f64, climb: f64| {
             let squared = power * upsilon / (factor * gamma) - climb * climb;
-            // Tolerates rounding for a hop exactly as long as the altitude.
+            // A hop may be exactly as long as the altitude, apart from rounding.
             (squared >= -1e-12 * climb * climb).then(|| squared.max(0.0).sqrt())
         };
         let last = reach(tail.power_w, self.eta, self.upsilon_at(d), tail.altitude_m)?;
@@ -52,24 +53,24 @@ impl StochasticLink {
         Some(places)
     }
 
-    /// Returns the first hop's expected SIR in the chain built backward from Rx for `gamma`. The result is at most
-    /// `gamma`, and 0 if there is no chain.
+    /// Returns the expected SIR of the first hop in the chain built backward for `gamma`, at most `gamma`.
+    ///
+    /// 0 if there is no chain.
     pub fn backward_sir(&self, gamma: f64) -> f64 {
         self.backward(gamma)
             .and_then(|places| self.hop_sirs(&places).first().map(|sir| sir.min(gamma)))
             .unwrap_or(0.0)
     }
 
-    /// Runs the paper's Algorithm 4: lowers the target SIR by `step` until the first hop meets it. The first target
-    /// is [`StochasticLink::ceiling`].
+    /// Runs the paper's Algorithm 4: lowers the target SIR by `step` until the first hop meets it.
     ///
-    /// The function differs from the printed algorithm in two points: the length of the last hop depends on the target,
-    /// and no relay is before Tx. `None` if no target above 0 is met, for example because `step` is larger than the
-    /// optimum.
+    /// The first target is [`StochasticLink::ceiling`]. Unlike in the printed algorithm, the length of the last hop
+    /// depends on the target, and no relay is before Tx. `None` if no target above 0 is met, for example because `step`
+    /// is larger than the optimum.
     pub fn algorithm4(&self, step: f64) -> Option<Backward> {
         let mut gamma = self.ceiling();
         let mut iterations = 1;
-        // A remainder below this is rounding.
+        // A smaller target is a rounding error.
         while gamma > 1e-6 * step {
             if let Some(places) = self.backward(gamma)
                 && self.hop_sirs(&places).first()? >= &gamma
@@ -86,11 +87,11 @@ impl StochasticLink {
         None
     }
 
-    /// Returns the largest value of [`StochasticLink::backward_sir`] that a search over target SIRs finds.
+    /// Returns the largest value of [`StochasticLink::backward_sir`] that a search over targets finds.
     ///
-    /// The search tries `points` targets from the ceiling down to 1e-8 of it, evenly spaced in their logarithm, and
-    /// then four times as many targets around the best target. It is used for interference for which the SIR has
-    /// several maxima as a function of the target. It can miss a maximum that is narrower than the spacing.
+    /// The search tries `points` targets from the ceiling down to 1e-8 of it, evenly spaced in their logarithm. Then it
+    /// tries four times as many around the best one. Use it if the SIR has several maxima over the target. It can miss
+    /// a maximum that is narrower than the spacing.
     pub fn backward_best(&self, points: u32) -> f64 {
         let (mut low, mut high) = (1e-8_f64.ln(), 0.0);
         let mut best = (0.0, 0.0);
@@ -108,8 +109,7 @@ impl StochasticLink {
         best.1
     }
 
-    /// Solves the paper's problem 1: the smallest number of relays whose backward chain meets `gamma`. The backward
-    /// chain is built from Rx to Tx.
+    /// Solves the paper's problem 1: the smallest number of relays whose backward chain meets `gamma`.
     ///
     /// All relays have the power and altitude of the first relay. `None` if more than `most` relays are needed, or if
     /// the target cannot be met. The result's `iterations` is the number of relays.

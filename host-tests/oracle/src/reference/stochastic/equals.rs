@@ -1,14 +1,14 @@
-//! The best chain of identical relays under constant interference.
+//! Best chain of equal relays if the interference is the same everywhere.
 
 use super::link::StochasticLink;
 
 impl StochasticLink {
-    /// Returns the best expected SIR (linear) of identical relays if interference is the same everywhere.
+    /// Returns the best expected SIR (linear) of equal relays if the interference is the same everywhere.
     ///
-    /// It solves the equation that all hops have the same SIR and together span the distance from Tx to Rx, with at
-    /// most about 2000 evaluations. The result is at most the SIR of the first hop with its relay straight above Tx,
-    /// and of the last hop with its relay straight above Rx. `None` without relays, if the relays differ, or if the
-    /// table has different values of Upsilon = E[1/I] (I is the interference power).
+    /// All hops then have the same SIR, and together span the distance from Tx to Rx. The result is at most the SIR of
+    /// a first hop right above Tx, and of a last hop from right above Rx. At most about 2000 evaluations.
+    ///
+    /// `None` without relays, if the relays differ, or if Upsilon differs in the table.
     pub fn iid_optimum(&self) -> Option<f64> {
         let (first, (_, u)) = (self.relays.first()?, *self.upsilon.first()?);
         let alike = self.relays.iter().all(|relay| relay == first)

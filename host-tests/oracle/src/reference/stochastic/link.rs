@@ -2,9 +2,9 @@
 
 use super::super::link::{Relay, received_w};
 
-/// Chain of relays between Tx at (0, 0) and Rx at (D, 0), in random interference known along the line.
+/// Chain of relays between Tx at (0, 0) and Rx at (D, 0) in random interference.
 ///
-/// The interference is given as Upsilon(x) = E[1/I], where I is the interference power at x.
+/// The interference is known as Upsilon(x) = E[1/I]; I is the interference power at x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StochasticLink {
     /// Distance D from Tx to Rx, m, > 0.
@@ -15,19 +15,19 @@ pub struct StochasticLink {
     pub mu_los: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Table of the random interference along the line: ascending x, m, each with Upsilon, 1/W.
+    /// Table of Upsilon along the line Tx-Rx: ascending x, m, each with Upsilon, 1/W.
     ///
-    /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant beyond the
-    /// first and the last position.
+    /// Upsilon = E[1/I], with the interference power I. It is linear between two x of the table, and constant beyond
+    /// the first and the last.
     pub upsilon: Vec<(f64, f64)>,
     /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,
 }
 
 impl StochasticLink {
-    /// Returns Upsilon, the mean inverse interference power E[1/I], at `x` metres, 1/W.
+    /// Returns Upsilon, the mean of 1/I, at `x`, m, in 1/W; I is the interference power.
     ///
-    /// It is interpolated between the positions of the table `upsilon`; NaN if the table is empty.
+    /// It is interpolated in the table `upsilon`; NaN if the table is empty.
     pub fn upsilon_at(&self, x: f64) -> f64 {
         let mut left: Option<(f64, f64)> = None;
         for &(at, value) in &self.upsilon {
@@ -42,7 +42,7 @@ impl StochasticLink {
         left.map_or(f64::NAN, |(_, value)| value)
     }
 
-    /// Returns the expected SIR (linear) of the N+1 hops with relay k at `x[k-1]` metres.
+    /// Returns the expected linear SIRs of the N+1 hops with relay k at `x[k-1]`, m.
     ///
     /// Empty without relays, or if the number of positions in `x` differs from the number of relays. Infinite if two
     /// relays share a position.
@@ -72,7 +72,7 @@ impl StochasticLink {
         sir
     }
 
-    /// Returns the expected SIR (linear) of the worst hop; 0 if [`StochasticLink::hop_sirs`] is empty.
+    /// Returns the expected linear SIR of the worst hop; 0 if [`StochasticLink::hop_sirs`] is empty.
     pub fn chain_sir(&self, x: &[f64]) -> f64 {
         self.hop_sirs(x).into_iter().reduce(f64::min).unwrap_or(0.0)
     }

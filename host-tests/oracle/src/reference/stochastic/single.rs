@@ -1,4 +1,4 @@
-//! Best position of one relay: the paper's Algorithm 3, as printed and corrected, and brute force.
+//! Best position of one relay: the paper's Algorithm 3, printed and corrected, and brute force.
 
 use super::link::StochasticLink;
 
@@ -7,7 +7,7 @@ use super::link::StochasticLink;
 pub struct Single {
     /// Position of the relay along the line from Tx, m.
     pub x_m: f64,
-    /// Smaller of two SIRs, linear: the target SIR, and the first hop's expected SIR.
+    /// Smaller of two SIRs, linear: the target SIR and the first hop's expected SIR.
     pub sir: f64,
     /// Number of target SIRs tried.
     pub iterations: usize,
@@ -16,24 +16,25 @@ pub struct Single {
 impl StochasticLink {
     /// Runs Algorithm 3 as printed: it stops at the first target SIR that the first hop meets.
     ///
-    /// The targets fall by `step` from the largest SIR that the second hop can have. If the first hop meets none of
-    /// them, the function returns the best position that it has tried. `None` unless the link has exactly one relay.
+    /// The targets fall by `step` from the largest SIR of the second hop. If the first hop meets no target, the result
+    /// is the best position tried. `None` unless the link has exactly one relay.
     pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
         self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
     }
 
     /// Runs the corrected Algorithm 3: it continues as long as a lower target SIR can be better.
     ///
-    /// The function returns the best position that it has tried. If the interference is the same everywhere, this
-    /// position can differ by one step from the position of the printed algorithm; its SIR is at least as high.
+    /// Returns the best position tried. If the interference is the same everywhere, this can be one step from the
+    /// printed algorithm's position; its SIR is at least as high. `None` unless the link has exactly one relay.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
             (best.sir >= gamma - step).then_some(best)
         })
     }
 
-    /// Lowers the target SIR by `step` until `end` returns a result, and returns this result. The arguments of `end`
-    /// are the relay's position for this target, the best position so far, and the target.
+    /// Lowers the target SIR by `step` until `end` returns a result, and returns this result.
+    ///
+    /// The arguments of `end` are the relay's position for this target, the best position so far, and the target.
     fn descend(
         &self,
         step: f64,
@@ -67,10 +68,10 @@ impl StochasticLink {
         best.map(|best| Single { iterations, ..best })
     }
 
-    /// Returns the best position (m) and expected SIR (linear) of one relay by brute force.
+    /// Returns the best position, m, and its expected SIR (linear) for one relay, by brute force.
     ///
-    /// It tries `points` positions between each two neighbouring positions of the interference table, then refines the
-    /// search four times around the best position. `None` unless the link has exactly one relay.
+    /// It tries `points` positions between each two neighbouring positions of the interference table, and refines the
+    /// search four times. `None` unless the link has exactly one relay.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
         let [_] = self.relays.as_slice() else {
             return None;

@@ -1,14 +1,16 @@
 //! Upsilon = E[1/I] of any distribution.
 
-/// Returns Upsilon = E[1/I], 1/W, of a random interference power I whose distribution is given.
+/// Returns Upsilon = E[1/I], 1/W, of a random interference power I.
 ///
-/// It integrates `m`(t) = E[exp(t I)], the moment-generating function of I, over all t < 0. The trapezoidal rule in
-/// the logarithm of -t is accurate to about 1e-13, since the integrand is analytic and falls off exponentially on
-/// both sides. `None` if the integral diverges in f64: E[1/I] is infinite or nearly so (a Beta distribution with
-/// alpha below about 1.1). At most some 4000 evaluations of `m`.
+/// `m`(t) = E[exp(t I)] is the moment-generating function of I. It is integrated over all t < 0 by the trapezoidal rule
+/// in the logarithm of -t. This is accurate to about 1e-13, since the integrand is analytic and falls off exponentially
+/// on both sides.
+///
+/// `None` if the integral diverges in f64: E[1/I] is infinite or nearly so (a Beta distribution with alpha below about
+/// 1.1). At most some 4000 evaluations of `m`.
 pub fn upsilon_by_mgf(m: impl Fn(f64) -> f64) -> Option<f64> {
     const STEP: f64 = 0.25;
-    // Near 1 / I, where the function has fallen to a half.
+    // Close to 1 / I, where `m` has fallen to a half.
     let centre = (-1000..=1000)
         .map(|k| f64::from(k) * 0.69)
         .find(|z| m(-z.exp()) < 0.5)?;
@@ -20,7 +22,7 @@ pub fn upsilon_by_mgf(m: impl Fn(f64) -> f64) -> Option<f64> {
         }
         let term = y * m(-y);
         sum += term;
-        // Remainder, if the terms continue to fall at the current ratio.
+        // Remainder of the sum, if the terms continue to fall by the same ratio.
         let ratio = term / last;
         let left = if ratio < 1.0 {
             term * ratio / (1.0 - ratio)

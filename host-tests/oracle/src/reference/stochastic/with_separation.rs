@@ -1,11 +1,11 @@
-//! The best chain of relays that differ, in any field and with any minimum separation.
+//! Best chain of relays that may differ, in any random interference and with any minimum separation.
 
 use super::link::StochasticLink;
 
-/// Disjoint intervals of x along the line, m, in ascending order.
+/// Disjoint intervals of x, m, in ascending order.
 type Stretches = Vec<(f64, f64)>;
 
-/// Returns the minimum of a convex function `value` between `low` and `high`, by search.
+/// Returns the minimum of the convex function `value` from `low` to `high`, by ternary search.
 fn least(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     let (mut a, mut b) = (low, high);
     for _ in 0..80 {
@@ -30,10 +30,9 @@ fn joined(mut all: Stretches) -> Stretches {
 impl StochasticLink {
     /// Returns the best expected SIR (linear) of all chains with relays at least `apart_m` apart.
     ///
-    /// It computes the set of all possible positions of each relay, from Rx back to Tx. Such a set consists of
-    /// intervals: as the receiver of a hop moves along an interval, the possible positions of its sender move, too. No
-    /// chain is left out, not even a chain in which relays stop short of their farthest position. 0 if no chain is
-    /// possible.
+    /// It computes the set of all possible positions of each relay, from Rx back to Tx. A set consists of intervals: as
+    /// the receiver of a hop moves along an interval, the possible positions of its sender move, too. Relays need not
+    /// go as far as possible, so no chain is left out. 0 if no chain is possible.
     pub fn best_apart(&self, apart_m: f64) -> f64 {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return 0.0;
@@ -61,9 +60,7 @@ impl StochasticLink {
         low
     }
 
-    /// Splits an interval of positions at the positions of the interference table.
-    ///
-    /// In each part Upsilon = E[1/I] is then linear; I is the interference power.
+    /// Splits an interval at the positions of the interference table. Upsilon is linear in each part.
     fn pieces(&self, (low, high): (f64, f64)) -> Stretches {
         let inside = self.upsilon.iter().map(|point| point.0);
         let inside = inside.filter(|x| *x > low && *x < high);
@@ -92,11 +89,11 @@ impl StochasticLink {
             let climb = (to.altitude_m - from.altitude_m).powi(2);
             let shortest = (apart_m.powi(2) - climb).max(0.0);
             let scale = from.power_w / (self.mu_los * target);
-            // Upper bound on the squared hop to y, along x.
+            // Upper bound on the squared length of the hop to y, along x.
             let room = |y: f64| scale * self.upsilon_at(y) - climb;
             let mut senders = Stretches::new();
             for piece in places.iter().flat_map(|places| self.pieces(*places)) {
-                // Linear there: the part that leaves room for the shortest hop.
+                // The bound is linear in this part. Keeps the positions at which the shortest hop fits.
                 let (mut a, mut b) = piece;
                 let (at_a, at_b) = (room(a) - shortest, room(b) - shortest);
                 if at_a < 0.0 && at_b < 0.0 {
