@@ -1,4 +1,4 @@
-//! Algorithm 2 for both directions: each turn compared with a grid search in f64, and whole chains.
+//! Algorithm 2 for both directions: the move of one relay, and whole chains, compared with a grid search in f64.
 
 use core::task::Poll;
 

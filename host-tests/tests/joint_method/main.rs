@@ -1,4 +1,4 @@
-//! Joint choice of positions, sides and altitudes: quality, cost, and independence from faults.
+//! Joint choice of x, lateral offset and altitude: quality, cost, and independence from faults.
 
 use chacha20::ChaCha8Rng;
 use host_tests::flights::{settle, with_room};

@@ -1,4 +1,4 @@
-//! Joint positions, sides and altitudes in noise, compared with recorded optima. `COUNT` selects up to 200 scenes.
+//! Joint positions and altitudes in noise, compared with recorded optima. `COUNT` selects up to 200 scenes.
 
 use std::task::Poll;
 

@@ -177,7 +177,7 @@ fn placements_meet_their_target() {
                 link.chain_sir(&x) >= target * (1.0 - 1e-14),
                 "{target:e} {link:?}"
             );
-            // A target that the farthest chain meets is within the exact optimum.
+            // The best SIR with all relays at their farthest positions is at most the exact optimum.
             assert!(
                 link.farthest_optimum()
                     .is_none_or(|greedy| greedy <= optimum * (1.0 + 1e-12))

@@ -434,7 +434,7 @@ fn sense(wire_message: &WireMessage, of: &MessageFields<'_>) -> Message {
     assert_eq!(*mission, of.word("view_digest"));
     let number = of.word("estimate_number");
     assert_eq!(*told, NumberedEstimate { number, estimate });
-    // Only this shows that the sums are in order.
+    // The order of the sums can be seen in this text only.
     assert_eq!(
         format!("{sums:?}"),
         format!("Sums {{ numbers: {numbers:?} }}")
