@@ -40,7 +40,8 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     (link, setup)
 }
 
-/// Returns the SIR of an outcome's worst hop by the f64 reference model, and the least distance of neighbours, m.
+/// Returns the SIR of an outcome's worst hop, and the least distance of neighbours, m. The SIR is computed by the f64
+/// reference model.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     let places: Vec<Place> = setpoints(outcome).into_iter().map(reference).collect();
     let apart = places.windows(2).map(|pair| pair[0].distance_m(&pair[1]));

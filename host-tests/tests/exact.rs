@@ -1,6 +1,6 @@
-//! Algorithms 1 and 4 compared with the f64 optimum, in chains that are not best with all relays at their farthest x.
+//! Algorithms 1 and 4 compared with the f64 optimum.
 //!
-//! `COUNT` and `SEED` select other scenes.
+//! The chains are not best with all relays at their farthest x. `COUNT` and `SEED` select other scenes.
 
 use host_tests::placing::{generator, profile_of, setpoints, xs};
 use rand::{Rng, RngExt};

@@ -1,4 +1,4 @@
-//! Algorithm 2 for both directions: the move of one relay, and whole chains, compared with a grid search in f64.
+//! Algorithm 2 for both directions, compared with a grid search in f64: moves of one relay, and chains.
 
 use core::task::Poll;
 

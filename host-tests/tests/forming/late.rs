@@ -1,4 +1,4 @@
-//! Late frames of an earlier life or view.
+//! Late frames from before a reboot, or of an earlier view.
 
 use uav_relay::wire::message::Message;
 use uav_relay::{Adjust, Local, Method, Settings};

@@ -1,4 +1,4 @@
-//! Plans with altitudes and lateral offsets, compared with relays' agreements and the reference optimiser.
+//! Plans with altitudes and lateral offsets, compared with agreements and the reference optimiser.
 
 use std::collections::BTreeMap;
 

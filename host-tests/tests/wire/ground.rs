@@ -73,7 +73,7 @@ fn messages_that_the_ground_may_not_send_are_misaddressed() {
             _ => "misaddressed",
         };
         assert_eq!(after.counted(), [expected], "{message:?}");
-        // The relay does not listen.
+        // The relay's settings have no `listen`, so it rejects the reported sample.
         let refused = u32::from(message.is("Level"));
         assert_eq!(after.stats().samples_rejected, refused, "{message:?}");
     }

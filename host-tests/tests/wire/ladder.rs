@@ -1,4 +1,4 @@
-//! Random ladders: targets and validity agree between the crate and the rules, to the bit.
+//! Random ladders (coded lists of target SIRs): the crate and the rules agree, to the bit.
 
 use proptest::prelude::*;
 use uav_relay::optimiser::ladder::Ladder;

@@ -1,4 +1,4 @@
-//! Meaning of the fields. The crate's message with the values that a body has by the tables, independent of the crate's decoder.
+//! Meaning of the fields: the crate's message, made from a body without the crate's decoder.
 
 use uav_relay::guard::Fence;
 use uav_relay::optimiser::PerTarget;
