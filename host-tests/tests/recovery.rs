@@ -11,7 +11,7 @@ use uav_relay_sim::simulator::setup::Setup;
 /// Time at which a relay is lost, s; the chain has settled long before.
 const AT_S: u64 = 60;
 
-/// Returns the setup of `relays` relays on one radio channel, of which relay `lost` fails.
+/// Returns the setup of `relays` relays on one radio channel. Relay `lost` fails.
 fn losing(relays: u16, lost: u16) -> Setup {
     let mut setup = Setup::on_shared_channel(mission(relays));
     setup.kills = vec![(lost, Instant::from_millis(1_000 * AT_S))];

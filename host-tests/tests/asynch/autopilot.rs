@@ -92,7 +92,7 @@ struct Vehicle {
     told: RefCell<Vec<(Instant, Placement)>>,
     /// Commands of a ground station that the simulated autopilot has not forwarded to the companion yet.
     commands: RefCell<VecDeque<MavMessage>>,
-    /// Results with which the companion has answered the ground station's commands.
+    /// Results in the companion's answers to the ground station's commands.
     results: RefCell<Vec<u32>>,
 }
 

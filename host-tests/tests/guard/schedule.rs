@@ -38,7 +38,7 @@ pub(crate) struct Report {
     pub(crate) reboots: u64,
     pub(crate) silences: u64,
     pub(crate) gone: u64,
-    /// Number of drones of which pilots took control.
+    /// Number of drones that pilots took over.
     pub(crate) taken: u64,
     /// Number of drones that their pilots moved along the line.
     pub(crate) along: u64,

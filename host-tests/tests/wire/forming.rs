@@ -155,7 +155,7 @@ fn a_member_adds_its_vote() {
 fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);
     let of = (last.mission, 0);
-    // Proposal by which the view of relay 3 was decided, and its size.
+    // View (4, 3), of relay 3: the proposal in which it was accepted, and its number of relays.
     let successor = |proposal: u32, relays: u16| json!({ "proposal": proposal, "view": id(4, 3), "relays": relays });
     let accepts = |decided: &WireMessage, relays: u16| {
         let accepted = json!({ "view": id(4, 3), "relays": relays });

@@ -154,7 +154,7 @@ pub(crate) fn relay_4(config: MissionConfig) -> (Bench, Port, Port) {
     (bench, from, to)
 }
 
-/// Returns the ports at which a relay receives messages along the chain, and at which it forwards them.
+/// Returns a relay's two ports for messages along the chain: to receive and to forward them.
 pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     match interference {
         Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),
