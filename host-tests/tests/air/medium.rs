@@ -107,7 +107,8 @@ fn two_frames_collide_only_in_the_same_slot() {
         assert!(lost == 0 || lost == 2, "seed {seed}");
         same += u64::from(lost == 2);
     }
-    // Both nodes must draw the same of eight slots. Otherwise the later node finds the channel busy and waits.
+    // Frames collide if both nodes draw the same of eight slots. Otherwise the later node finds the channel busy and
+    // waits.
     let share = same as f64 / runs as f64;
     assert!((share - 1.0 / 8.0).abs() < 0.02, "{share}");
 }

@@ -81,7 +81,7 @@ fn only_the_next_pass_number_is_new() {
 #[test]
 fn the_first_pass_after_a_reboot_is_never_the_next_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
-    // There are `last` passes after the first. A rebooted leader begins 64 above the old first number.
+    // There are `last` passes after the first. A rebooted leader may begin 64 above the old first number.
     for last in [32, 62, 63] {
         let mut tail = after_two(&sweep, now, 0);
         (1..=last).for_each(|off| again(&mut tail, &sweep, now, off));

@@ -63,7 +63,7 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
         // Up to 48 requests, a third of a second apart, must be unanswered first.
         let questions = quiet.as_micros() + 48 * 300_000 * 9 / 8;
         assert!(took <= questions.max(lost.as_micros()) + slack, "{took} us");
-        // The last reception may be up to `probe_after` earlier than the end of the drone.
+        // The last frame may have been received up to `probe_after` before the drone was switched off.
         assert!(
             took + quiet.as_micros() + SLACK >= lost.as_micros(),
             "{took} us"
