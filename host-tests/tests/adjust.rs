@@ -1,4 +1,4 @@
-//! Algorithm 2: turns never make the chain worse, and the fine search gains more than a coarse grid.
+//! Algorithm 2: it never lowers the chain's SIR, and its fine search gains more than a coarse grid.
 
 use core::task::Poll;
 
@@ -40,7 +40,7 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     (link, setup)
 }
 
-/// Returns the SIR of an outcome's worst hop, and the least distance of neighbours, m. The SIR is by the f64
+/// Returns the SIR of an outcome's worst hop, and the least distance of neighbours, m. The SIR is computed by the f64
 /// reference model.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     let places: Vec<Place> = setpoints(outcome).into_iter().map(reference).collect();
@@ -170,7 +170,7 @@ fn grid_search_moves_as_the_reference_program() {
 fn the_fine_search_is_as_good_as_a_dense_grid() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));
     let (mut lower, mut higher, mut far) = (0.0_f64, 0, 0);
-    // The neighbour to keep away from is the louder one: the best position would be next to it.
+    // So large a separation that it limits the best position in some scenes.
     let apart_m = 120.0;
     let mut nearest = f32::INFINITY;
     for _ in 0..300 {
@@ -215,7 +215,7 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
     println!("nearest neighbour at {nearest} m");
     assert!((apart_m - 1e-2..apart_m + 5.0).contains(&nearest));
     assert!(higher > 200);
-    // Next to the interferer a row may have two maxima, of which bisection finds one.
+    // At one altitude near the interferer the SIR may have two maxima along x, of which bisection finds one.
     assert!(far <= 3, "{far}");
 }
 
@@ -246,7 +246,7 @@ fn adjusting_ends_in_a_local_optimum() {
             local,
         };
         let (_, mut setup) = setup(relays, adjust);
-        // The start is far from the end, except that the first relay may well stay.
+        // The start is far from the final positions, except perhaps for the first relay.
         let low = Profile {
             altitude_m: 60.0,
             power_w: 1.0,

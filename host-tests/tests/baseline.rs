@@ -68,8 +68,10 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// Returns the largest value that the weakest signal can have with relays at grid points, W. The grid has `points` steps. `chosen` has the
-/// positions of the first relays; the last `left` relays are at the same or farther points.
+/// Returns the largest value that the weakest signal can have with relays at grid points, W.
+///
+/// The grid has `points` steps. `chosen` has the positions of the first relays. The other `left` relays are not nearer
+/// to Tx than these.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {
         return weakest_signal(link, chosen);

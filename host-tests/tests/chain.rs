@@ -328,7 +328,8 @@ fn a_silent_relay_is_noticed_by_both_neighbours_in_time() {
         let noticed: Vec<_> = outcome.noticed.keys().copied().collect();
         assert_eq!(noticed, [(2, Side::Downstream), (4, Side::Upstream)]);
         for (&(by, _), &when) in &outcome.noticed {
-            // The question after `dead_after` notices the loss, at most a sixteenth of 10 s and an eighth of that later.
+            // The first heartbeat request after `dead_after` detects the loss. Requests are at most 9/8 of a sixteenth
+            // of 10 s apart.
             assert!(
                 when.since(killed) <= Duration::from_millis(15_000 + 625 * 9 / 8),
                 "relay {by} took until {when:?}"

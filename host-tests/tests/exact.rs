@@ -1,6 +1,6 @@
-//! Algorithms 1 and 4 where the farthest chain is not optimal, compared with the f64 optimum.
+//! Algorithms 1 and 4 compared with the f64 optimum.
 //!
-//! `COUNT` and `SEED` select other scenes.
+//! The chains are not best with all relays at their farthest x. `COUNT` and `SEED` select other scenes.
 
 use host_tests::placing::{generator, profile_of, setpoints, xs};
 use rand::{Rng, RngExt};
@@ -108,7 +108,7 @@ impl Tally {
             "{reached} above {best}: {told}"
         );
         let bound = f64::from(agreed.most.unwrap());
-        // The bound covers the optimum even where the optimum is missed.
+        // The bound is valid even if the result is below the optimum.
         assert!(
             bound >= best * (1.0 - ROUNDING),
             "{bound} does not cover {best}: {told}"

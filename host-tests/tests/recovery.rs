@@ -11,7 +11,7 @@ use uav_relay_sim::simulator::setup::Setup;
 /// Time at which a relay is lost, s; the chain has settled long before.
 const AT_S: u64 = 60;
 
-/// Returns a chain of `relays` on one radio channel that loses relay `lost`.
+/// Returns the setup of `relays` relays on one radio channel. Relay `lost` fails.
 fn losing(relays: u16, lost: u16) -> Setup {
     let mut setup = Setup::on_shared_channel(mission(relays));
     setup.kills = vec![(lost, Instant::from_millis(1_000 * AT_S))];
@@ -78,8 +78,8 @@ fn a_loss_is_noticed_within_15_s_and_costs_up_to_six_sweeps() {
             );
             assert!(noticed <= 15.0, "{name} of {relays}: {noticed}");
             assert!((1..=6).contains(&sweeps), "{name} of {relays}: {sweeps}");
-            // The next relay has to notice the loss too, up to a renewal period of 2.5 s later; a search for a missing neighbour
-            // takes as long as the silence did.
+            // The other neighbour may notice the loss up to a renewal period, 2.5 s, later. If an end relay is lost,
+            // its neighbour searches for another node for as long as the silence lasted.
             let search = if lost == 1 || lost == relays {
                 10.1
             } else {

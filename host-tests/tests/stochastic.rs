@@ -29,7 +29,7 @@ fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> Stocha
     };
     let mu_los = log_uniform(rng, 1.0, 1e4);
     let eta = mu_los * log_uniform(rng, 1.0, 1.9);
-    // The unit makes the SIRs about 1.
+    // This unit of Upsilon makes the SIRs about 1.
     let unit = mu_los * d * d / (relay.power_w * (relays * relays) as f64);
     let base = unit * log_uniform(rng, 0.3, 30.0);
     let upsilon = (0..points)

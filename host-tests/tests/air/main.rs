@@ -21,7 +21,7 @@ use uav_relay_sim::simulator::medium::{Access, Agenda, AirCounts, AirEvent, Medi
 /// Test bench: a radio channel with its own clock, and the frames completed on the channel.
 struct Bench {
     medium: Medium,
-    /// Nodes that receive each node: `hearers[n]` are the nodes that receive node n.
+    /// Receivers of each node: the nodes `hearers[n]` receive the frames of node n.
     hearers: Vec<Vec<usize>>,
     due: BinaryHeap<Reverse<(Instant, u64, usize, u8)>>,
     order: u64,

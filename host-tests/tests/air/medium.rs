@@ -107,7 +107,8 @@ fn two_frames_collide_only_in_the_same_slot() {
         assert!(lost == 0 || lost == 2, "seed {seed}");
         same += u64::from(lost == 2);
     }
-    // There are eight slots; a node that finds the channel busy draws again, and the other one has finished by then or later.
+    // Frames collide if both nodes draw the same of eight slots. Otherwise the later node finds the channel busy and
+    // waits.
     let share = same as f64 / runs as f64;
     assert!((share - 1.0 / 8.0).abs() < 0.02, "{share}");
 }
@@ -154,7 +155,7 @@ fn a_node_waits_longer_each_time_the_channel_is_busy() {
         bench.offer(at(micros(100)), 1, &[1; 20]);
         times += bench.end().1.deferred;
     }
-    // The channel is busy for 300 to 370 more bytes: waits grow to 35, 75 and 155 bytes on average, so three fit.
+    // Times in bytes: the first frame lasts 300 to 370 more. Waits grow to 35, 75 and 155 on average, so three fit.
     let mean = times as f64 / runs as f64;
     assert!((2.5..4.5).contains(&mean), "{mean}");
 }

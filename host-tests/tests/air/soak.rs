@@ -86,7 +86,7 @@ fn split(quorum: bool) -> Setup {
 fn without_a_quorum_two_groups_fly_at_once() {
     let (_, both) = watched(split(false));
     assert_eq!(both.most_flying, 2);
-    // Both halves have the same size, and each is right.
+    // The halves have the same size: each is the longest chain that can form, and has its best positions.
     assert!(both.availability.unwrap() > 0.85, "{both:?}");
 }
 

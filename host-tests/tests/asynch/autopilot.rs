@@ -92,7 +92,7 @@ struct Vehicle {
     told: RefCell<Vec<(Instant, Placement)>>,
     /// Commands of a ground station that the simulated autopilot has not forwarded to the companion yet.
     commands: RefCell<VecDeque<MavMessage>>,
-    /// Results with which the companion has answered the ground station's commands.
+    /// Results in the companion's answers to the ground station's commands.
     results: RefCell<Vec<u32>>,
 }
 
@@ -290,7 +290,7 @@ impl Scene {
             }
         };
         let task = async move {
-            // Boxed, because all relays and links are in it.
+            // The future is boxed because it is large: it contains all relays and links.
             let _: ((Infallible, Infallible), (), (), Infallible) = Box::pin(task).await;
         };
         pool.spawner().spawn_local(task).unwrap();
@@ -323,7 +323,7 @@ fn the_drone_is_engaged_and_led_to_its_position() {
             AutopilotEvent::Ready,
             AutopilotEvent::State(State::Engaged),
         ];
-        // Of the states between two polls only the last is reported.
+        // If the state changes several times between two polls, only the last state is reported.
         assert_eq!(seen.events, expected);
         assert!(seen.flown);
         let (place, setpoint) = (scene.vehicle.place.get(), seen.setpoint.unwrap());

@@ -37,7 +37,8 @@ fn signing_adds_handshakes_and_changes_no_position() {
                     .sum()
             };
             let links = u64::from(relays - 1);
-            // A pass there and back, and perhaps the first two lease renewals; without a key also claims of relay numbers.
+            // On each link: a sweep and its result, and perhaps two lease renewals with theirs. Plain chains add index
+            // claims.
             let messages = sum(|stats| stats.received);
             assert!([2 * links, 6 * links].contains(&messages));
             assert!(plain.messages >= messages);
@@ -51,7 +52,8 @@ fn signing_adds_handshakes_and_changes_no_position() {
                 outcome.bytes, plain.bytes
             );
             assert!(sum(|stats| stats.handshakes) <= handshakes);
-            // A link is authenticated by three handshakes, or four that cross; the leader has messages to send before that.
+            // A link needs three handshakes, or four if both ends begin at once. The leader's first messages may cause
+            // three more.
             assert!((3 * links..=4 * links + 3).contains(&handshakes));
         }
     }
@@ -117,7 +119,8 @@ fn a_rebooted_relay_rejoins_by_new_handshakes() {
         assert!(places.iter().all(Option::is_some));
         net.run(Instant::from_millis(3_999));
         assert_eq!(net.bits()[3], None, "the relay begins anew");
-        // A leader that forgot its view is no member of it: its positions are not used before the others' lease has expired.
+        // The rebooted leader has forgotten its view. New positions are used only after the others' old lease has
+        // expired.
         for end in [7_999, 40_000] {
             net.run(Instant::from_millis(end));
             assert_eq!(net.bits(), places);

@@ -76,7 +76,7 @@ impl Plain {
         [10, 18].map(|at| u64::from_le_bytes(self.0[at..at + 8].try_into().unwrap()))
     }
 
-    /// Appends the authentication tag that `key` and the nonces of sender and receiver give.
+    /// Appends the authentication tag for `key` and the nonces of sender and receiver.
     pub(crate) fn signed(mut self, key: &[u8; 32], nonces: [u64; 2]) -> Self {
         let tag = tag(key, nonces, &self.0);
         self.0.extend(tag);

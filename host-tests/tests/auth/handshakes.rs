@@ -132,7 +132,7 @@ fn a_relay_recovers_from_a_replayed_handshake() {
     *net.relay(2) = fresh;
     net.genuine[1] = 0;
     net.starts[1] = 2;
-    // No messages are due until a relay asks for a sign of life; that leads to handshakes, and the next question to an answer.
+    // The relays are silent until the first heartbeat request. It leads to handshakes; the next request is answered.
     net.run(Instant::from_millis(14_000));
     assert!(net.is_proven(1, 2) && net.is_proven(2, 1));
     assert_eq!(net.stats(2).received, net.genuine[1]);

@@ -87,7 +87,7 @@ pub(crate) struct Attack {
     pub(crate) raises: &'static str,
 }
 
-/// Returns the receive counters by which attacks are judged, with their names.
+/// Returns the receive counters, with their names. The test judges attacks by these counters.
 pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     [
         ("received", stats.received),

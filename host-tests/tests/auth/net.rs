@@ -162,7 +162,7 @@ impl Net {
             .is_none_or(|(_, next)| heard.number < *next)
     }
 
-    /// Returns true if the receiver still uses the nonces with which a recorded frame was signed.
+    /// Returns true if the receiver still uses the nonces of a recorded frame's tag.
     pub(crate) fn is_of_current_starts(&self, heard: &RecordedFrame) -> bool {
         let RecordedFrame {
             from,

@@ -158,7 +158,7 @@ impl Pair {
 fn the_time_of_a_px4_counts_in_flight() {
     let mut pair = Pair::flying(Kind::Px4);
     pair.vehicle.battery(0, 61, 1_000);
-    // 180 s of reserve, 180 s of a replacement.
+    // Limit: 180 s of reserve, 180 s for a replacement, and the flight home.
     assert_eq!(pair.told(), [Some(900), Some(360 + HOME_S)]);
     // SYS_STATUS and other batteries say less than the first one's BATTERY_STATUS.
     pair.vehicle.sys_status(40);
@@ -202,7 +202,7 @@ fn without_a_home_the_endurance_is_unknown() {
     pair.vehicle.home(far);
     pair.vehicle.battery(0, 61, 1_000);
     assert_eq!(pair.told()[0], None);
-    // Before its home is known, a drone has only just been found.
+    // The unknown endurance before the home position was known does not count as a loss.
     assert_eq!(pair.relay.endurance_losses(), 1);
 }
 
@@ -289,7 +289,7 @@ fn a_relay_with_a_low_battery_requests_to_leave() {
     let left = pair.run(200, falls, Pair::departs).unwrap();
     assert!((62..=65).contains(&left), "{left} s");
     assert_eq!(pair.unknowns(), 0);
-    // An end of the messages is reported, and cancels nothing.
+    // If the messages stop, this is reported, and the request to leave stays.
     assert_eq!(pair.run(30, |_, _| {}, |pair| !pair.departs()), None);
     assert_eq!((pair.unknowns(), pair.relay.endurance_losses()), (1, 1));
     assert_eq!(pair.relay.endurance_s(pair.vehicle.now), None);
@@ -313,8 +313,9 @@ fn an_endurance_that_was_never_known_is_told_at_the_start_of_control() {
     }
 }
 
-/// Checks that the pilot is told to leave every 5 s when only the reserve is left. The chain has refused the departure. The text stops when
-/// the pilot takes control.
+/// Checks that a status text every 5 s tells the pilot to leave when only the reserve is left.
+///
+/// The chain has refused the departure. The text stops when the pilot takes control.
 #[test]
 fn the_pilot_is_told_to_leave_at_the_last_reserve() {
     const LEAVE: &str = "battery: leave now";
@@ -341,7 +342,7 @@ fn the_pilot_is_told_to_leave_at_the_last_reserve() {
                 .all(|pair| (5.0..6.1).contains(&(pair[1] - pair[0]))),
             "{times:?}"
         );
-        // Without a position, too.
+        // The text also comes if the position is unknown.
         pair.vehicle.position_every_ms = u64::MAX;
         pair.run(60, falls, |_| false);
         assert_eq!(pair.vehicle.link.state(), State::Blind);
@@ -476,7 +477,7 @@ fn the_operators_order_to_stay_holds() {
     // Of 340 s beyond the way home less than 170 s are left from 281 s on.
     assert_eq!(relay.endurance_limit_s(), Some(50 + 170));
     assert_eq!(fly(&mut relay, 110, 400), Some(296));
-    // At the end of the endurance an order to stay holds for good, but not the firmware's own order to leave.
+    // With no endurance left, an order to stay holds until the firmware itself orders the relay to leave.
     relay.stay(at(500));
     assert_eq!(fly(&mut relay, 500, 900), None);
     assert!(relay.poll_timeout().is_none_or(|due| due > at(899)));
@@ -524,7 +525,7 @@ fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
             assert_eq!(fly(&mut relay, 34, 49, 900.0), Departure::Outside);
         }
         assert_eq!(fly(&mut relay, 49, 51, 900.0), before, "recovered");
-        // One value before a silence is all that is known.
+        // A single low value, followed by silence, counts as well after 15 s.
         let (mut relay, before) = start();
         relay.handle_endurance(at(2), 100.0, 0.0);
         for s in 3..60 {
@@ -532,7 +533,8 @@ fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
             let stays = relay.departure(at(s)) == before;
             assert_eq!(stays, s < 17, "{s}");
         }
-        // Without a later view a relay returns after 15 s, but not a spare, and none at its reserve.
+        // If no later view exists, a relay returns after 15 s in spite of its low endurance. A spare does not return,
+        // and a relay at its reserve only by the operator's order.
         let (mut relay, _) = start();
         assert_eq!(fly(&mut relay, 2, 18, 250.0), Departure::Outside);
         let stays = fly(&mut relay, 18, 60, 250.0) == Departure::Outside;
@@ -730,7 +732,8 @@ fn a_way_home_from_an_old_position_is_unknown() {
 /// the pilot must choose the mode once more.
 #[test]
 fn messages_of_the_battery_hide_no_silence_of_a_px4() {
-    // In some phases of the link's time stamps only the silence is noticed, no late reply to a time stamp.
+    // The phase shifts the link's TIMESYNC requests. In some phases no reply is late, and the link notices only the
+    // silence.
     for phase in 0..10 {
         let mut vehicle = Vehicle::engaged(Kind::Px4, 300.0);
         vehicle.run(50 * phase);

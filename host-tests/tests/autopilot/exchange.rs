@@ -60,7 +60,7 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
         }
         let mut expected = relay.clone();
         let (is_news, position) = vehicle.link.exchange(relay, now);
-        // Control before the position: the first position of an engaged drone is where its relay starts.
+        // Control is reported first, because a relay starts at the first position after its drone is engaged.
         expected.handle_control(now, vehicle.link.is_flown());
         expected.report_control(vehicle.link.state(), false);
         if let Some(position) = position {

@@ -76,7 +76,7 @@ fn the_drone_is_led_to_its_position_and_held_there() {
     let last = targets.last().unwrap().1;
     assert_eq!(last.type_mask, 0x0DF8, "a position alone to end with");
     assert!((last.place().x_m - 180.0).abs() < 0.02);
-    // The velocity is that of the target, 80 m toward the north-east.
+    // The velocity is that of the target, which moves 80 m to the north-east.
     let (_, quick) = moving[moving.len() / 2];
     let [north, east, _] = quick.velocity_m_s;
     assert!(north > 1.0 && east > 1.0 && north.hypot(east) <= 5.01);

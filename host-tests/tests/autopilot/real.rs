@@ -160,7 +160,7 @@ pub(crate) struct Real {
     sent_at: Instant,
     /// Number of times that a PX4 resumed OFFBOARD because the companion sent targets in a failsafe.
     ///
-    /// Only failsafes of which the companion already knew count here.
+    /// A failsafe counts only if the companion already knew of it.
     pub(crate) resumed: u32,
     /// Number of times that a PX4 resumed OFFBOARD before the companion knew of the failsafe.
     pub(crate) resumed_late: u32,

@@ -52,7 +52,7 @@ impl Chain {
     /// Returns the power of interference plus noise that `node` receives at x = `x`, W.
     fn disturbance_w(&self, node: usize, x: f64) -> f64 {
         if let [first, .., last] | [first @ last] = self.field.as_slice() {
-            // With noise each point has 1 / (I + N), and lines between.
+            // With noise, the field is 1 / (I + N) at each point, and linear between the points.
             let heard = |upsilon: f64| 1.0 / (1.0 / upsilon + self.noise_w);
             let around = self
                 .field

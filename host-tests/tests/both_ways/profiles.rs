@@ -1,8 +1,8 @@
 //! Positions of Algorithm 1 for both directions, for relays with own altitudes, powers or a separation.
 //!
-//! Relays with their own altitudes and powers take the best positions. With a separation that binds Algorithm 1 is exact neither in one
-//! direction nor in both: `near_optimal_with_a_separation` in `tests/exact.rs` is the counterpart for one direction. With 500 scenes of
-//! each kind (`COUNT=500`)
+//! Relays with their own altitudes and powers take the best positions. If the minimum separation limits the positions,
+//! Algorithm 1 is not exact, neither in one direction nor in both. The test for one direction is
+//! `near_optimal_with_a_separation` in `tests/exact.rs`. Results of 500 scenes of each kind (`COUNT=500`):
 //!
 //! | scenes | both ways: within 1e-4, within 5 % | one way |
 //! | --- | --- | --- |
@@ -133,7 +133,7 @@ fn best_places(seed: u64, what: &str, is_exact: bool, change: fn(&mut ChaCha8Rng
         if is_exact {
             assert_eq!([both.tight, one.tight], [both.all, one.all]);
         }
-        // Algorithm 1 takes a relay's positions for an interval, which they are not always.
+        // Algorithm 1 assumes that the possible positions of a relay form an interval, which is not always so.
         assert!(both.near * 100 >= both.all * 80);
     }
 }

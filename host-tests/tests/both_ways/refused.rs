@@ -1,4 +1,4 @@
-//! Missions with a way back, and what does not support one.
+//! Missions with a way back (Rx to Tx): refused numbers, and refused relay settings.
 
 use host_tests::fixtures::paper;
 use uav_relay::mission::MissionError;

@@ -56,7 +56,7 @@ fn an_interferer_that_is_located_is_placed_for_in_both_directions() {
         told.push(chain.value(&xs(&places)) / best);
         first.push(sirs[0] / best);
         last.push(sirs.last().unwrap() / best);
-        // The scene's judgement, which reports use, is the worse direction too.
+        // The SIR in reports also counts the worse direction.
         let reported = wild.scene().unwrap().chain_sir(&places);
         let judged = chain.value(&xs(&places));
         assert!(

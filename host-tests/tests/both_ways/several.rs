@@ -1,5 +1,5 @@
-//! Two-way chains with several interferers, placed by the hypothetical one that replaces them. The judge places
-//! relays for the sum.
+//! Two-way chains with several interferers. The relays plan for one hypothetical interferer that replaces them, the
+//! judge for all of them.
 
 use host_tests::placing::{generator, places, solve, xs};
 use rand::{Rng, RngExt};

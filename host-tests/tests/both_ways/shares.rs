@@ -1,4 +1,4 @@
-//! Shares of a judge's values: worst, percentiles, and a line for the table.
+//! Ratios of SIRs to the SIRs of a reference search: the worst, percentiles, and a table row.
 
 /// Ratios of two SIRs, one ratio for each random scene. A ratio is the tested SIR divided by the SIR of the reference search.
 #[derive(Debug, Default)]

@@ -1,8 +1,9 @@
-//! Judge of chains with a way back and free altitudes and sides, in f64. It shares no code with the crate.
+//! Judge of chains with a way back and free altitudes and lateral offsets, in f64. It shares no code with the crate.
 //!
-//! For candidate positions of each relay, dynamic programming over the hops finds the combination with the best worst hop. The
-//! candidates are a grid over the whole space first, then windows about the best positions, jittered, and smaller ones when they
-//! no longer help. Chains at one height are refined as well. Relays may be in any order along the line.
+//! The judge has candidate positions for each relay. Dynamic programming over the hops finds the combination with the
+//! best worst hop. The first candidates are a grid over the whole space. Then they are randomly shifted windows around
+//! the best positions, which shrink when they no longer help. Chains at one altitude are refined as well. Relays may be
+//! in any order along the line.
 
 use rand::{Rng, RngExt};
 

@@ -1,4 +1,4 @@
-//! Algorithm 2 for both directions: each turn compared with a grid search in f64, and whole chains.
+//! Algorithm 2 for both directions, compared with a grid search in f64: moves of one relay, and chains.
 
 use core::task::Poll;
 

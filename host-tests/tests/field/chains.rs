@@ -62,7 +62,7 @@ fn algorithm_4_takes_the_steps_of_the_reference_program() {
     assert_eq!((fifty.iterations, fifty.places.len()), (1, 50));
     evenly(&fifty.places, 20.0, 20.0);
 
-    // There are more relays than the distance has room for at full reach: some end up above Tx.
+    // At full reach fewer than 100 relays fill the distance: the others are above Tx.
     let hundred = paper(100).algorithm4(0.1).unwrap();
     assert_eq!((hundred.iterations, hundred.places[0]), (1, 0.0));
     // The optimum of eight, 0.09117, is below the step, so no target is found.
@@ -95,7 +95,7 @@ fn algorithm_3_takes_the_steps_of_the_reference_program() {
     assert!(off(printed.x_m, 77.297_916_056_347_92) < 1e-6);
     assert!(off(printed.sir, 0.006_499_999_999_999_889_5) < 1e-6);
     assert_eq!(printed.iterations, 336);
-    // The corrected algorithm may end a step earlier, but never lower.
+    // The corrected algorithm may end a step earlier, but its SIR is never lower.
     let right = link.algorithm3(1e-4).unwrap();
     let (_, optimum) = link.single_optimum(1000).unwrap();
     assert!(right.sir >= printed.sir && right.sir <= optimum * (1.0 + 1e-12));

@@ -20,7 +20,7 @@ fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
         with += (weight - y * ln_u.exp()).exp();
         z += STEP;
     }
-    // The other integrand has its mass elsewhere.
+    // Without the factor e^(-y u), the integrand is large over another range.
     let mut z = -4.0 - 45.0 / alpha;
     while z < high {
         without += (-alpha * (-z).exp().ln_1p() - beta * z.exp().ln_1p()).exp();
@@ -98,7 +98,7 @@ fn the_integral_gives_known_values_of_distributions() {
         let found = upsilon_by_mgf(|t| mean(-t)).unwrap();
         assert!(off(found, f64::ln(b / a) / (b - a)) < 1e-11, "{a} {b}");
     }
-    // Two levels, six decades apart.
+    // I has two possible values, six decades apart.
     let found = upsilon_by_mgf(|t| 0.25 * t.exp() + 0.75 * (1e-6 * t).exp()).unwrap();
     assert!(off(found, 0.25 + 0.75e6) < 1e-12);
     // Exponential distribution: 1 / I has no mean.

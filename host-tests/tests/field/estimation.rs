@@ -113,7 +113,8 @@ fn the_standard_error_covers_the_error_of_few_samples() {
         for alpha in [1.2, 1.5, 2.0, 4.0, 20.0] {
             for beta in [0.5, 3.0, 20.0] {
                 let found = found(alpha, beta, samples, first);
-                // Close to alpha = 1 an estimate exists only if chance made alpha large: it misleads, but rarely.
+                // For alpha near 1 an estimate exists only if the fitted alpha is by chance too large. It is then
+                // wrong, but rare.
                 assert!(
                     found.made - found.covered <= 10,
                     "{alpha} {beta}: {found:?}"

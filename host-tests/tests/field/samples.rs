@@ -76,7 +76,7 @@ fn no_estimate_without_enough_samples_or_spread() {
         }
         assert_eq!(still.estimate(), None, "{level}");
     }
-    // From 61 dB below the largest value, the fixed-point resolution would show.
+    // Powers 61 dB and more below `I_max` are too small for the fixed-point resolution.
     assert!(scaled(2e-12).is_some());
     assert_eq!(scaled(0.8e-12), None);
 }

@@ -1,4 +1,4 @@
-//! Fitted slots on board: positions and rates of the joint method. They are compared with the planner's shortest path.
+//! Fitted slots (each as long as its hop needs) by the joint method, compared with the planner.
 //!
 //! `COUNT` and `SEED` in the environment set the number of scenes and the first seed.
 #![allow(

@@ -49,7 +49,7 @@ fn no_epoch_comes_twice_whenever_power_fails() {
                 flash.power = Some(rng.random_range(1..=ENTRY + 1));
             }
             let (epoch, _) = start(&mut flash, 1).unwrap();
-            // With a power failure no frames were signed.
+            // If the power failed, no frames were signed with this epoch.
             if flash.switch_on() {
                 failures += 1;
             } else {

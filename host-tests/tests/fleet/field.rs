@@ -1,4 +1,4 @@
-//! Numbers and optima of identical relays in a field.
+//! Numbers of relays that meet a target, and best targets, in a field of interference.
 
 use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
@@ -107,7 +107,7 @@ fn the_fewest_in_a_field_are_those_of_a_grid_search() {
         let mission = of_stochastic_link(&link, 0.0).unwrap();
         let common = mission.config().common;
         let target = round(link.ceiling() * log_uniform(&mut rng, 3e-4, 1.1));
-        // The grid needs no fewer relays; with longer hops it needs no more.
+        // The grid needs at least as many relays; with hops one grid step longer, it needs at most as many.
         let at_most = on_a_grid(&link, target, MOST, 0.0);
         let at_least = on_a_grid(&link, target, MOST, 1.0);
         let told = Fewest::of(&mission, target as f32, |_| common)
@@ -188,7 +188,7 @@ fn identical_relays_in_a_field_are_optimal() {
             above += 1;
             gain = gain.max(best / backward - 1.0);
         }
-        // The target is met, and a slightly higher one is not even with the grid's longer hops.
+        // The target is met. A target 3 % higher is not met on the grid.
         let x = chain(&mission, n as u16, best, |_| mission.config().common);
         assert!(link.chain_sir(&x) >= best * (1.0 - 5e-6));
         let fewest = on_a_grid(&link, best * 1.03, n, 0.0);

@@ -116,7 +116,7 @@ fn the_fewest_are_those_of_an_exhaustive_search() {
         let x = chain(&mission, found.unwrap().relays, target, &profile_of);
         let sir = with(&link, told).chain_sir(&x);
         assert!(sir >= target * (1.0 - ROUNDING), "{sir} {target} {link:?}");
-        // One relay fewer is not enough, by each relay's set of possible positions.
+        // One relay fewer is not enough; this follows from the sets of positions that each relay can have.
         if told > 1 && told <= 40 {
             fewer += 1;
             let fewer = with(&link, told - 1).placement(target * (1.0 + ROUNDING));
@@ -201,7 +201,7 @@ fn no_number_of_relays_exceeds_the_reported_maximum() {
         let found = Fewest::of(&mission, most.target, &profile_of).unwrap();
         assert_eq!(found.relays, most.relays);
         if link.min_separation_m > 0.0 {
-            // A chain with a separation may reach more than one with a lower target.
+            // With a separation, a chain may meet a higher target although it does not meet a lower one.
             exceeded += u32::from(Fewest::of(&mission, most.target * 1.001, &profile_of).is_some());
             continue;
         }

@@ -1,4 +1,4 @@
-//! Chain of the paper's link in virtual time, of which relays reboot, and the margin of its result.
+//! Test chain with the paper's link, in virtual time. Its relays can reboot.
 
 use host_tests::bench::{Bench, Frame};
 use host_tests::fixtures::NETWORK;

@@ -1,4 +1,4 @@
-//! Late frames of an earlier life or view.
+//! Late frames from before a reboot, or of an earlier view.
 
 use uav_relay::wire::message::Message;
 use uav_relay::{Adjust, Local, Method, Settings};
@@ -61,7 +61,7 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     assert_eq!(chain.bench.relays[2].view().number(), 1);
     chain.reboot(1, 4);
     let second = |chain: &Bench| chain.holds() && chain.relays[2].view().number() == 2;
-    // Relay 2 forgot a view that needs it, whose lease must expire first, 15 s after a renewal.
+    // Relay 2 has forgotten that it is a member of view 1. The lease of view 1, 15 s, must expire first.
     chain.until(10_000 + 16_000, second).unwrap();
     let before = chain.bench.setpoints();
     let stale = chain.bench.relays[2].stats().stale;
@@ -89,7 +89,7 @@ fn a_relay_that_learns_of_a_newer_view_requests_one() {
     chain.bench.flying.clear();
     chain.reboot(0, 8);
     chain.reboot(1, 9);
-    // The tail rejects passes of view 0 and reports its view. It is a member elsewhere until its lease expires.
+    // The tail rejects passes of view 0 and reports view 1, on which it may rely until its lease expires.
     let took = chain.until(10_000 + 16_000, |chain| {
         chain.holds() && chain.relays[0].view().number() == 2
     });

@@ -1,4 +1,4 @@
-//! Chains of two to six relays with reboots and late frames, passed by hand: they agree again.
+//! Chains of two to six relays with reboots and late frames agree again. The tests themselves deliver the frames.
 
 mod hand;
 mod late;

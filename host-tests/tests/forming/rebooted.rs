@@ -11,7 +11,7 @@ use host_tests::bench::Bench;
 /// be close to the last number before the reboot.
 #[test]
 fn a_rebooted_leader_is_answered_for_any_seed() {
-    // With prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
+    // Without prediction a chain needs several passes, so a new number may be just below the last one.
     for predict in [true, false] {
         let settings = Settings {
             predict,

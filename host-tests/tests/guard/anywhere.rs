@@ -1,4 +1,4 @@
-//! Guards of drones along a line that turns. They are engaged and given back anywhere in the air.
+//! Motion guards of drones along a Tx-Rx line that turns. Drones are engaged and given back anywhere in the air.
 //!
 //! Drones move as behind the autopilot link: at most 5 m/s, slower close to the setpoint, with a lagging controller's overshoot.
 //!

@@ -4,11 +4,11 @@
 //! | --- | --- |
 //! | relays | 1 to 12 |
 //! | separation | log-uniform 1 m to 50 m; in 5 % 0 |
-//! | D | 0.1 % to 50 % more than the relays take at the separation in 40 %; else 2 to 20 times that |
-//! | reports off by | 0 in 70 %; else up to a twentieth of the separation |
+//! | distance from Tx to Rx | in 40 % 1.001 to 1.5 times the product of separation and number of relays; else 2 to 20 times that |
+//! | error of reported positions | 0 in 70 %; else up to a twentieth of the separation |
 //! | start and agreed positions | anywhere across the line; in order, the separation apart along x, crowded at Tx, at Rx, in the middle, or spread |
 //! | neighbours | closer along x than the separation in half of the agreements, depending on their positions across the line |
-//! | further agreements | 40 s before and some seconds after a relay's neighbours link past it: on close neighbours, then on other positions |
+//! | further agreements | when neighbours link past a relay: 40 s before on positions close along x, up to 5 s after on other positions |
 //! | agreements | 0 to 6 in 200 s, each received by a relay with 80 %, up to 60 s late; 20 % closer along x than the separation |
 //! | speed | changes every 20 s on average, 0 in 25 %, else 1 m/s to 40 m/s |
 //! | acceleration | without a limit in 50 %, else 4 m/s^2 to 40 m/s^2 |
@@ -38,7 +38,7 @@ pub(crate) struct Report {
     pub(crate) reboots: u64,
     pub(crate) silences: u64,
     pub(crate) gone: u64,
-    /// Number of drones of which pilots took control.
+    /// Number of drones that pilots took over.
     pub(crate) taken: u64,
     /// Number of drones that their pilots moved along the line.
     pub(crate) along: u64,

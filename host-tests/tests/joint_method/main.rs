@@ -1,4 +1,4 @@
-//! Joint choice of positions, sides and altitudes: quality, cost, and independence from faults.
+//! Joint choice of x, lateral offset and altitude: quality, cost, and independence from faults.
 
 use chacha20::ChaCha8Rng;
 use host_tests::flights::{settle, with_room};
@@ -27,10 +27,10 @@ fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
     Some(setup)
 }
 
-/// Asserts that a run took `messages` messages, apart from those by which relays claim their index.
+/// Asserts that a run took `messages` messages, apart from index claims.
 ///
-/// Such messages are sent at fixed times after the start. At each of these times, a relay may send two of them: its
-/// own claim, and its echo of another claim.
+/// Relays send claims at fixed times after the start. At each of these times, a relay may send two: its own claim, and
+/// its echo of another claim.
 fn assert_messages(outcome: &Outcome, relays: u64, messages: u64) {
     let seconds = outcome.ended.as_micros() as f64 * 1e-6;
     let times = [2.25, 2.75, 3.75, 5.75, 9.75, 17.75];
@@ -46,8 +46,8 @@ fn places(outcome: &Outcome) -> Vec<Place> {
     setpoints(outcome).into_iter().map(reference).collect()
 }
 
-/// Returns the scenario for which the documentation states results. The interferer is at (500, 150) m, altitudes are
-/// 20 m to 300 m, and the separation is 4 m.
+/// Returns a scenario whose results are in the documentation. The interferer is at (500, 150) m, altitudes are 20 m to
+/// 300 m, and the separation is 4 m.
 fn close_by(relays: usize) -> (Link, Corridor) {
     roomy(relays, 500.0, 150.0, 0.0, 300.0)
 }
@@ -112,8 +112,8 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
     results
 }
 
-/// Returns a scenario for which the documentation states results. The interferer is at (`x_m`, `y_m`), m. Lateral offsets are up to
-/// `lateral_m` to either side, altitudes 20 m to `most_m`.
+/// Returns a scenario whose results are in the documentation. The interferer is at (`x_m`, `y_m`), m. Lateral offsets
+/// are up to `lateral_m` to either side, altitudes 20 m to `most_m`.
 fn roomy(relays: usize, x_m: f64, y_m: f64, lateral_m: f64, most_m: f64) -> (Link, Corridor) {
     let link = Link {
         x_i: x_m,

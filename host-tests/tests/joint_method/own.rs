@@ -25,7 +25,7 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     let drawn = scenario(rng, &(2..=20), ROOMY);
     let mut drawn = with_own(rng, drawn).as_relays_know_it();
     let common = drawn.link.relays.iter().map(|relay| relay.power_w);
-    // Relay 1 has the mission's profile, so that it is not unlike.
+    // Relay 1 has the mission's profile, so it does not count as different.
     let first = common.clone().next()?;
     if drawn.held.is_empty() && common.into_iter().all(|power_w| power_w == first) {
         return None;

@@ -1,4 +1,4 @@
-//! Acceptance of signed frames: each once, in the lives of both ends in which it was sent.
+//! Acceptance of signed frames: each at most once, and only in the epochs at which it was sent.
 
 use std::collections::BTreeSet;
 

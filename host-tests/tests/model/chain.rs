@@ -27,7 +27,7 @@ pub(crate) struct World<'a> {
     pub(crate) wires: Wires,
     pub(crate) ledgers: Vec<Ledger>,
     pub(crate) tally: Tally,
-    /// Largest epoch with which any relay has been started.
+    /// Largest epoch of any relay so far.
     pub(crate) epochs: u32,
 }
 

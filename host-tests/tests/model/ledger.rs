@@ -372,9 +372,10 @@ impl Ledger {
             let looks = there && settings.method != Method::Joint;
             let idle = !looks || signs.missed;
             let asked = signs.asked.last().map_or(signs.last, |(_, asked)| *asked);
-            // Questions are checked once per tick. The bound shows only in a turn with another cause, for example a claim.
+            // A relay checks once per tick whether a request is due. A late request shows only in a turn for another
+            // reason.
             let due = (signs.possibly_alive + settings.probe_after).max(signs.last) + tick;
-            // Signed questions wait for the handshake.
+            // Signed requests wait for the handshake.
             prop_assert!(
                 idle || scenario.signs() || turn.now <= due.max(asked + tick),
                 "not asked by relay {}: {signs:?}",

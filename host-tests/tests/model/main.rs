@@ -9,7 +9,7 @@
 //! | `ledger` | observed state of one relay, and rules that it may not break |
 //! | `chain` | connected relays and the clock, with the rules of neighbours |
 //! | `effect` | effect of each operation |
-//! | `accepted_frames` | signed frames: accepted once, in the lives in which they were sent |
+//! | `accepted_frames` | signed frames: accepted once, in the epochs at which they were sent |
 //! | `passes` | passes in which a relay may take part |
 //! | `recovery` | recovery from any state to one agreement |
 //! | `tally` | coverage counters |

@@ -50,7 +50,7 @@ pub(crate) enum Operation {
 }
 
 /// Step between random seeds of a leader. A step raises the number of the leader's first message by 64, the least
-/// amount possible, so that a rebooted leader with such a seed repeats recent numbers.
+/// amount possible. A leader that reboots with such a seed therefore repeats recent numbers.
 const NEXT_LIFE: u32 = 54_336;
 
 /// Draws a relay's random seed. With some seeds, a rebooted leader repeats its recent message numbers, which is hard

@@ -1,9 +1,9 @@
-//! Passes in which a relay may take part: each once, in order, starting with the first one of its view.
+//! Passes (messages along the chain) in which a relay may take part: each once, in order.
 //!
-//! One weakness of closed-loop chains is excused: a relay that reboots during the first pass of a view takes part in it again,
-//! and forwards other content if it has measured other interference since. The next relay then requests a new view, but may
-//! return the result of the earlier content: until then the hop between the two misses the target. Frames with tags are not
-//! accepted that late.
+//! The first is the first pass of the relay's view. One weakness of closed-loop chains is excused. A relay that reboots
+//! during this pass takes part in it again, and forwards other content if it has measured other interference since. The
+//! next relay then requests a new view, but may return the result of the earlier content. Until the new view, the hop
+//! between the two misses the target. Frames with tags are not accepted that late.
 
 use proptest::{prop_assert, prop_assert_eq};
 use uav_relay::wire::digest::digest;
@@ -105,7 +105,7 @@ impl Ledger {
         let again = after.repeated - before.repeated;
         let counted = match met {
             PassClass::Accepted => stale == 0 && again == 0,
-            // A pass that differs in more than its number is of another life.
+            // A pass with the last number but other content is from before a reboot, and stale.
             PassClass::Again => stale + again == 1,
             PassClass::Late => stale == 1,
             PassClass::Foreign => stale + other == 1,

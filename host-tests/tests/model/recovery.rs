@@ -62,7 +62,8 @@ impl World<'_> {
         let greets = if self.scenario.signs() { 2 } else { 0 };
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
         let silence_us = greets * probe_after_us + 2 * self.view_request_time().as_micros();
-        // A view may need a relay that rebooted and forgot it: positions are not used before its lease has expired.
+        // A rebooted relay may have forgotten its view. New positions are used only after the lease of that view has
+        // expired.
         let lease_us = self.scenario.settings[0].dead_after.as_micros();
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }

@@ -252,7 +252,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     for one in &mut settings {
         one.hold_altitude = rng.random_bool(0.1);
     }
-    // Recorded without the separation: that optimum is above any with it, and a search finds it reliably.
+    // The optimum is without the separation. It is not below the optimum with it, and a search finds it reliably.
     let unseparated = Link {
         min_separation_m: 0.0,
         ..link.clone()
@@ -288,7 +288,7 @@ fn in_a_field(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
         power_w: round(log_uniform(rng, 0.1, 10.0)),
     };
     let mu_los = log_uniform(rng, 1.0, 1e4);
-    // The unit makes the SIRs about 1.
+    // This unit of Upsilon makes the SIRs about 1.
     let unit = mu_los * (distance_m / f64::from(relays)).powi(2) / relay.power_w;
     let upsilon: Vec<(f64, f64)> = (0..points)
         .map(|at| {

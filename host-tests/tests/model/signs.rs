@@ -75,7 +75,7 @@ impl Signs {
                 self.last = now;
                 self.open_since_possible = 0;
                 self.possibly_alive = self.possibly_alive.max(*asked);
-                // So few questions followed this one that it must still be open.
+                // The request is so recent that it must still count as unanswered.
                 if now.since(*asked) < tick.times(OPEN) {
                     self.certainly_alive = self.certainly_alive.max(*asked);
                     self.open = 0;

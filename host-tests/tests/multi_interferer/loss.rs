@@ -18,7 +18,7 @@ use super::scenes::{Sources, scenario};
 /// Relative tolerance of the target SIR on which the relays agree.
 const TOLERANCE: f64 = 1e-5;
 
-/// Upper limits of the classes by which the relative error of a fitted interferer is reported.
+/// Upper limits of the classes of a fitted interferer's relative error.
 const CLASSES: [f64; 6] = [0.001, 0.01, 0.03, 0.1, 0.3, 1.0];
 
 /// Relative error of a fitted single interferer, and its cost. The cost is the fraction of the best SIR that a chain loses by this error.

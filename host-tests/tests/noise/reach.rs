@@ -58,7 +58,7 @@ fn the_reach_in_noise_is_monotonic() {
             continue;
         };
         let start = of.from + rng.random_range(0.0..=1.0) * (reach - of.from);
-        // A start without room for a hop has none.
+        // A start this close to the reach leaves no room for a hop.
         if reach - start < 2e-6 * of.link.distance_m as f32 {
             continue;
         }

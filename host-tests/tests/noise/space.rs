@@ -1,4 +1,6 @@
-//! Joint positions, sides and altitudes in noise, compared with recorded optima. `COUNT` selects up to 200 scenes.
+//! Joint positions with lateral offsets and altitudes in noise, compared with recorded optima.
+//!
+//! `COUNT` selects up to 200 scenes.
 
 use std::task::Poll;
 

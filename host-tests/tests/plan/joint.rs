@@ -1,4 +1,4 @@
-//! Plans with altitudes and sides, compared with the relays' agreement and the reference optimiser.
+//! Plans with altitudes and lateral offsets, compared with agreements and the reference optimiser.
 
 use std::collections::BTreeMap;
 

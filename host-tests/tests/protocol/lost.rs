@@ -18,13 +18,13 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
         };
         encode(1, 2, &beat)
     };
-    // A relay that took part in a pass has no view to request.
+    // A relay that has taken part in a pass does not request a view.
     let mut tail = relay(mission(2), 2);
     let (start, sweep) = first_sweep(&mut relay(mission(2), 1));
     tail.handle_bytes(start, Port::Upstream, &sweep);
     drain(&mut tail, start);
     events(&mut tail);
-    // Time of each question.
+    // Times of the heartbeat requests.
     let mut asked = Vec::new();
     let mut now = start;
     let mut seen = Vec::new();
@@ -65,22 +65,22 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
     else {
         panic!("{seen:?}");
     };
-    // The loss is reported after `dead_after` at the next question: questions are 10 s / 64 apart, and up to an eighth more.
+    // The first request after `dead_after` reports the loss. Requests are 10 s / 64 apart, or up to an eighth more.
     assert!(
         (15_000..=15_000 + 157 * 9 / 8).contains(&lost_ms),
         "{lost_ms}"
     );
     let count = asked.len();
-    // Up to 64 questions in the ten seconds until the loss, then one in five seconds.
+    // There are up to 64 requests in the ten seconds before the loss, then one every five seconds.
     assert!((60..=75).contains(&count), "{count} heartbeats in a minute");
-    // Only an answer to one of the last four questions is a sign of life.
+    // Only a reply to one of the last four requests is a sign of life.
     let last = u16::try_from(count).unwrap();
     for (ask, answer) in [(9, 0), (0, last - 4), (0, 1), (0, last + 1), (0, u16::MAX)] {
         tail.handle_bytes(now, Port::Upstream, &beat(ask, answer));
         assert_eq!(events(&mut tail), [], "{ask} {answer}");
         drain(&mut tail, now);
     }
-    // An answer counts from the time of its question.
+    // A reply counts from the time of its request.
     for before in 0..4_u16 {
         let mut after = tail.clone();
         let late = now + Duration::from_millis(100);
@@ -105,7 +105,7 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
             after.handle_timeout(lost);
             drain(&mut after, lost);
         }
-        // The neighbour is lost after `dead_after` and sixteen questions, or three times as many as were open.
+        // The neighbour is lost after `dead_after` at the earliest, and after 8 times `dead_after` at the latest.
         let due = heard + Duration::from_millis(15_000);
         let longest = heard + Duration::from_millis(8 * 15_000);
         let latest = longest + Duration::from_millis(157 * 9 / 8);

@@ -182,7 +182,7 @@ fn relays_of_different_missions_ignore_and_report_each_other() {
     );
     let (now, sweep) = first_sweep(&mut head);
     tail.handle_bytes(now, Port::Upstream, &sweep);
-    // By its digest a pass may be of another view: the relays must exchange hellos.
+    // The pass may be of another view, to judge by its digest: the relays must exchange hellos.
     assert_eq!(
         (tail.phase(), tail.stats().view, tail.stats().mission),
         (Phase::Idle, 1, 0)
@@ -235,7 +235,7 @@ fn foreign_misaddressed_and_misdirected_frames_are_counted() {
         1,
         "a port that is not wired is deaf"
     );
-    // The frame with the relay's own number is of another relay 2.
+    // The relay answers the frame with its own number by a claim: a second relay 2 has sent that frame.
     assert!(matches!(
         &drain(&mut relay, now)[..],
         [(Port::Upstream, Message::Claim(_), _)]

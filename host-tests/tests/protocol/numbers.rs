@@ -1,4 +1,4 @@
-//! Pass numbers: new, over, or of another life of the leader; equal numbers are compared by content.
+//! Numbers of passes: new, late, or from before the leader's reboot. Equal numbers are compared by content.
 
 use uav_relay::wire::message::{Message, Sweep};
 use uav_relay::{Duration, Instant, Phase, Port, Relay};
@@ -61,7 +61,7 @@ fn only_the_next_pass_number_is_new() {
                 assert_eq!(stale, 0, "{off}");
                 found[0] += 1;
             }
-            // Numbers 32 to 1 behind.
+            // Numbers 1 to 32 below the last one: late passes.
             0xFFE0.. => {
                 assert!(!requests_view(&mut tail, now), "{off}");
                 assert_eq!(stale, 1, "{off}");
@@ -81,7 +81,7 @@ fn only_the_next_pass_number_is_new() {
 #[test]
 fn the_first_pass_after_a_reboot_is_never_the_next_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
-    // The chain is `last` passes beyond its first; the next first number is 64 after it.
+    // There are `last` passes after the first. A rebooted leader may begin 64 above the old first number.
     for last in [32, 62, 63] {
         let mut tail = after_two(&sweep, now, 0);
         (1..=last).for_each(|off| again(&mut tail, &sweep, now, off));
@@ -90,7 +90,7 @@ fn the_first_pass_after_a_reboot_is_never_the_next_one() {
         again(&mut tail, &sweep, now, 64);
         assert_eq!(tail.stats().stale, 1, "{last}");
         assert!(requests_view(&mut tail, now), "{last}");
-        // The leader skips that number.
+        // A leader that did not reboot skips that number.
         again(&mut tail, &sweep, now, 65);
         let expected = if last == 63 { 1 } else { 2 };
         assert_eq!(tail.stats().stale, expected, "{last}");
@@ -150,7 +150,7 @@ fn the_fourth_late_pass_in_a_row_requests_a_view() {
             assert!(!requests_view(&mut tail, now), "{round}");
             now = now + Duration::from_millis(1);
         }
-        // The chain proceeds, so the three stragglers were late frames.
+        // The next pass follows, so the three late passes were only delayed frames.
         again(&mut tail, &sweep, now, 2 + round);
         drain(&mut tail, now);
     }

@@ -73,7 +73,7 @@ pub(crate) fn image(example: &str) -> PathBuf {
     folder.join(example)
 }
 
-/// Returns the log strings of a firmware image, by which its log is decoded.
+/// Returns the log strings of a firmware image, which are needed to decode its log.
 fn table(which: Image) -> &'static Table {
     static TABLES: [OnceLock<Table>; 4] = [const { OnceLock::new() }; 4];
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))

@@ -52,7 +52,7 @@ fn four_of_five_on_one_radio_recover_from_a_loss() {
         let took = story(&fleet.lines, *drone, place).unwrap();
         println!("drone {drone}: agreed {took} us after it was counted");
     }
-    // Only drone 3 was lost. A drone may select the one past it before its own wait is over, and then reports no loss.
+    // Only drone 3 is reported. A neighbour that links past drone 3 before its own timeout reports no loss.
     let lost = fleet.lines.iter();
     let lost = lost.filter(|line| line.text.contains("does not reply"));
     let lost: Vec<(u16, &str)> = lost.map(|line| (line.drone, line.text.as_str())).collect();

@@ -60,10 +60,10 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
             "drone {} noticed after {took} us of its own clock, give or take {slack}",
             side.0
         );
-        // Up to 48 questions, a third of a second apart, must be unanswered first.
+        // Up to 48 requests, a third of a second apart, must be unanswered first.
         let questions = quiet.as_micros() + 48 * 300_000 * 9 / 8;
         assert!(took <= questions.max(lost.as_micros()) + slack, "{took} us");
-        // The last reception precedes the query by at most the longest quiet time of a link.
+        // The last frame may have been received up to `probe_after` before the drone was switched off.
         assert!(
             took + quiet.as_micros() + SLACK >= lost.as_micros(),
             "{took} us"

@@ -84,9 +84,8 @@ fn reaches_agree_with_a_scan() {
 
 /// Checks that the optimum of one and two relays agrees with brute force.
 ///
-/// The cases are with and without a minimum separation. At different altitudes, the optimum may not be the chain in
-/// which each relay goes as far along as possible, so that the reference follows all possible positions of each
-/// relay.
+/// The cases are with and without a minimum separation. At different altitudes, a relay may have to stop short of its
+/// farthest position. So the reference computes all possible positions of each relay.
 #[test]
 fn one_and_two_relays_agree_with_brute_force() {
     for (seed, count, n, chain, points, apart) in [
@@ -177,7 +176,7 @@ fn placements_meet_their_target() {
                 link.chain_sir(&x) >= target * (1.0 - 1e-14),
                 "{target:e} {link:?}"
             );
-            // A target that the farthest chain meets is within the exact optimum.
+            // The best SIR with all relays at their farthest positions is at most the exact optimum.
             assert!(
                 link.farthest_optimum()
                     .is_none_or(|greedy| greedy <= optimum * (1.0 + 1e-12))

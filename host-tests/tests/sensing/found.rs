@@ -62,7 +62,7 @@ fn sources_are_found() {
             flown,
             &[(LAST, 0.5, 0.95)],
         ),
-        // The source that comes nearest to both.
+        // The relays estimate the one source that fits both best.
         (
             "two sources",
             &[8],

@@ -53,7 +53,7 @@ fn under_faults_all_estimates_are_equal_to_the_bit() {
             assert!(outcome.injected.lost > 0 && outcome.injected.corrupted > 0);
             let told: Vec<_> = outcome.relays.iter().map(|relay| relay.believed).collect();
             assert!(told.iter().all(|one| one.number > 0));
-            // A held position belongs to the current estimate; the last estimate may still be in transit.
+            // The last estimate may still be in transit to some relays, but estimates with one number are equal.
             let bits = |one: &uav_relay::sensing::estimate::NumberedEstimate| format!("{one:?}");
             let alike = told.iter().all(|one| {
                 let same = |other: &&_| bits(one) == bits(other);

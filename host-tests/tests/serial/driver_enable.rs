@@ -89,7 +89,7 @@ fn the_driver_is_enabled_while_bytes_leave_and_no_longer() {
 
             let bench = Rc::new(RefCell::new(Bench::default()));
             call(Io(IoUart(uart(&bench))), &bench, 20_000);
-            // The bytes of a poll are only counted at the next one.
+            // The bytes of one poll are counted only in the next poll.
             check(
                 &bench.borrow(),
                 3 * byte_time + 4 * lag,

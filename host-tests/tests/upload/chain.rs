@@ -207,7 +207,7 @@ fn an_older_version_has_no_effect() {
 #[test]
 fn an_infeasible_mission_is_followed_by_a_feasible_one() {
     let base = mission(3);
-    // With fixed steps there is no position for a target below the first one.
+    // With fixed steps of 0.2, no target is feasible in the mission with the strong interferer.
     let mut setup = signed(base, true);
     setup.settings.schedule = Schedule::FixedStep { step: 0.2 };
     let mut hopeless = moved(&base, 500.0, 0.0);

@@ -68,7 +68,8 @@ impl Wires {
             .unwrap();
     }
 
-    /// Makes the ground station at `end` request the mission in flight. The relays' mission before flight is `base`.
+    /// Makes the ground station at `end` request the mission that the relays fly. Their mission before flight is
+    /// `base`.
     pub(crate) fn request_flown(&mut self, base: &Mission, end: Side) {
         let now = self.bench.now;
         self.bench.ground(base, end, AUTH).request_flown(now);

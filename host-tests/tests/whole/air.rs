@@ -339,7 +339,7 @@ impl Air {
                 let drone = &mut self.drones[at];
                 if drone.is_on {
                     let now = drone.clock(self.now_us);
-                    // A refused upload is as old as the stored one.
+                    // The relay refuses an upload that is not newer than the stored one.
                     let _ = drone.relay.handle_upload(now, &upload);
                     return Some(at);
                 }

@@ -76,7 +76,7 @@ impl Schedule {
         self.cut_link_between(other, one, from_us, until_us);
     }
 
-    /// Cuts the links between the relays for which `is_in` is true and all others, between two times.
+    /// Separates the relays with `is_in` true from all other relays, between two times.
     pub(crate) fn cut(&mut self, is_in: impl Fn(usize) -> bool, from_us: u64, until_us: u64) {
         let all = usize::from(self.kind.mission.relays());
         for one in 0..all {

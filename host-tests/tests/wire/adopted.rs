@@ -64,7 +64,7 @@ fn a_granted_view_flies_the_mission_of_its_proposal() {
         };
         assert_eq!(out.iter().any(hello), expected != [0, 0], "{digest:04x}");
     }
-    // Heartbeats always carry the base's digest.
+    // Heartbeats always carry the digest of the mission before flight.
     for (mission, expected) in [(base, 0), (flown, 1), (own, 1)] {
         let mut after = met.clone();
         after.receive(0, &beat(mission, 0, 0));

@@ -1,4 +1,4 @@
-//! Requests for a view, and their end.
+//! Requests for a membership view, and when a relay stops sending them.
 
 use serde_json::json;
 use uav_relay::{Event, Instant, Phase, Port, ViewId, Wiring};

@@ -97,7 +97,7 @@ fn a_quorum_is_over_half_or_half_with_the_proposer() {
         for relays in 1..=20 {
             for votes in 0..=relays {
                 for proposer in [false, true] {
-                    // The view is newer than the last relay's own, which is no member of it.
+                    // The earlier view, 8, is newer than the last relay's own view. The last relay is not its member.
                     let proposal = proposal.with(json!({
                         "agreed_view": id(8, 3), "agreed_relays": relays, "votes": votes,
                         "lease_left_ds": 77, "proposer": proposer,
@@ -110,7 +110,7 @@ fn a_quorum_is_over_half_or_half_with_the_proposer() {
                     } else {
                         (Event::NoQuorum, 0, refused(id(9, 1), of, 12, 12))
                     };
-                    // A missing member may hold the earlier view for as long.
+                    // If a vote is missing, its member may rely on the earlier view for the rest of its lease.
                     let left = if votes == relays { 0 } else { 77 };
                     let expected = decision.with(json!({
                         "base_view": id(8, 3), "base_relays": relays, "usable_in_ds": left,
@@ -155,7 +155,7 @@ fn a_member_adds_its_vote() {
 fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);
     let of = (last.mission, 0);
-    // Proposal by which the view of relay 3 was decided, and its size.
+    // View (4, 3), of relay 3: the proposal in which it was accepted, and its number of relays.
     let successor = |proposal: u32, relays: u16| json!({ "proposal": proposal, "view": id(4, 3), "relays": relays });
     let accepts = |decided: &WireMessage, relays: u16| {
         let accepted = json!({ "view": id(4, 3), "relays": relays });
@@ -165,7 +165,8 @@ fn a_possibly_decided_view_is_proposed_again() {
         proposed(id(9, 1), of, 11, 20).with(json!({ "successor": successor(id(6, 2), 17) }));
     accepts(&decided_by(&mut last, &proposal), 17);
     assert_eq!((last.view(), last.events()), (ViewId::LOADED, vec![]));
-    // The relay has accepted that view by this proposal too, and reports it unless a later acceptance is reported.
+    // The relay has also accepted that view in proposal (9, 1). It reports this unless the new proposal reports an
+    // acceptance that is as late or later.
     for (told, relays) in [
         (json!(null), 17),
         (successor(id(8, 2), 9), 17),
@@ -195,7 +196,7 @@ fn a_leader_continues_after_an_earlier_view_is_decided() {
     let mut out = head.receive(Port::Downstream, &decision);
     assert_eq!(head.view(), ViewId::LOADED);
     assert_eq!(head.counted(), ["received"]);
-    // All have accepted the view, so its members decide on the next one; this relay does not vote.
+    // All members have accepted the earlier view, so they decide on the next one. This relay has no vote.
     let next = proposed(id(3, 1), of, 1, 8).with(json!({
         "agreed_view": id(1, 2), "agreed_relays": 7, "votes": 0, "lease_left_ds": u16::MAX,
         "earlier_lease_left_ds": u16::MAX, "proposer": false,

@@ -169,8 +169,8 @@ fn a_collection_with_its_receivers_profile_is_stale() {
 /// Checks that a relay counts a wrong `Gathered` message as stale and keeps its state.
 ///
 /// `Gathered` carries the result of a collection: the profiles (altitude and power) of the relays. It is wrong if it
-/// has another collection number or another start of the collection, lacks profiles, has the profile of a relay
-/// beyond the chain's end, or arrives a second time.
+/// has another collection number or another start, or arrives a second time. It is also wrong if it lacks profiles, or
+/// has the profile of a relay beyond the chain's end.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let mut bench = fourth(false);

@@ -41,8 +41,8 @@ fn ground_stations_offer_request_and_get_replies() {
             let told: Vec<WireMessage> = out.into_iter().map(|(_, message)| message).collect();
             (told, met.events(), met.clone())
         };
-        // Its other side is still silent; and a leader awaits no pass. The hello counts the relays connected away from the
-        // ground station: only itself while it is fresh.
+        // A relay that has not taken part in a pass is fresh, and counts only itself as connected. The leader is not
+        // fresh.
         let (flags, behind) = if own == 1 { (0, 8) } else { (FRESH, 1) };
         let (told, ..) = hears(&hello(base, 0, (1, 1), READY));
         assert_eq!(told, [], "it has not asked");
@@ -73,7 +73,7 @@ fn messages_that_the_ground_may_not_send_are_misaddressed() {
             _ => "misaddressed",
         };
         assert_eq!(after.counted(), [expected], "{message:?}");
-        // The relay does not listen.
+        // The relay's settings have no `listen`, so it rejects the reported sample.
         let refused = u32::from(message.is("Level"));
         assert_eq!(after.stats().samples_rejected, refused, "{message:?}");
     }

@@ -74,7 +74,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
         let seat = json!({ "relay": relay, "altitude_m": 30.0, "power_w": 0.5 });
         of(name, json!({ "after": 0, "seats": [seat] }))
     };
-    // Two relays' measurements of a source that all estimate alike.
+    // Measurements of two relays, and an estimate of the source that all relays have in common.
     let heard = json!({
         "estimate_number": 1, "estimate": 4, "source_power_w": 62.5, "source_x_m": 600.0, "source_y_m": -250.0,
         "source_at_rx_w": 1e-6, "sum_ab": [2, 0, 0, 0, 0, 0, 0, 0, 0, 0], "sum_av": [0, 0, 0, 0], "sum_vv": 0.5,
@@ -154,7 +154,7 @@ pub(crate) fn relay_4(config: MissionConfig) -> (Bench, Port, Port) {
     (bench, from, to)
 }
 
-/// Returns the ports at which a relay receives messages along the chain, and at which it forwards them.
+/// Returns a relay's two ports for messages along the chain: to receive and to forward them.
 pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     match interference {
         Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),

@@ -1,4 +1,4 @@
-//! Random ladders: targets and validity agree between the crate and the rules, to the bit.
+//! Random ladders (coded lists of target SIRs): the crate and the rules agree, to the bit.
 
 use proptest::prelude::*;
 use uav_relay::optimiser::ladder::Ladder;
@@ -24,7 +24,7 @@ fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     targets[8..].to_vec()
 }
 
-/// Returns the codes by which a sweep message gives its target SIRs: anchor, gap and growth.
+/// Returns the coded target SIRs of a sweep message: anchor, gap and growth.
 fn ladder_of(sweep: &WireMessage) -> (f32, u8, u8) {
     let code = |name| sweep.number(name) as u8;
     let anchor = sweep.number("anchor") as f32;

@@ -1,4 +1,4 @@
-//! Meaning of the fields. The crate's message with the values that a body has by the tables, independent of the crate's decoder.
+//! Meaning of the fields: the crate's message, made from a body without the crate's decoder.
 
 use uav_relay::guard::Fence;
 use uav_relay::optimiser::PerTarget;
@@ -434,7 +434,7 @@ fn sense(wire_message: &WireMessage, of: &MessageFields<'_>) -> Message {
     assert_eq!(*mission, of.word("view_digest"));
     let number = of.word("estimate_number");
     assert_eq!(*told, NumberedEstimate { number, estimate });
-    // Only this shows that the sums are in order.
+    // The order of the sums can be seen in this text only.
     assert_eq!(
         format!("{sums:?}"),
         format!("Sums {{ numbers: {numbers:?} }}")

@@ -1,4 +1,4 @@
-//! Mutated golden bodies. For changed numbers at every offset the verdict of the crate is that of the tables.
+//! Mutated golden bodies: the crate accepts exactly those that the tables permit.
 
 use uav_relay::wire::message::{Message, MessageError};
 

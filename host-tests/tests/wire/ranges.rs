@@ -1,4 +1,4 @@
-//! Room for the relays of an offer, and the encoding of an operator's upload.
+//! Offers whose relays do or do not fit on the line, and the encoding of an operator's upload.
 
 use host_tests::fixtures::paper;
 use serde_json::json;

@@ -225,7 +225,7 @@ fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     assert_eq!(relay.setpoint(), None, "it may still be braking");
     let stopped = adopted + guard.lag + Duration::from_millis(500);
     until(&mut relay, stopped, 1_700.0);
-    // Beyond the old box, it is found there and sent on.
+    // The drone is beyond its old range of x. Its setpoint is nevertheless the agreed position.
     assert_eq!(relay.setpoint(), Some(agreed));
     assert_eq!(relay.agreed_place(), Some(agreed));
 }

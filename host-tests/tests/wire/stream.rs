@@ -118,7 +118,7 @@ fn every_chunk_size_gives_the_same_frames() {
 fn the_tail_of_an_oversized_frame_is_never_a_frame() {
     let vectors = vectors().frames;
     let good = &vectors[0].wire;
-    // At any point where a deframer might restart, one of these places a valid frame.
+    // Wherever a deframer restarts too early, one of these fillings makes it find a valid frame.
     let data_runs = |len: usize| -> Vec<u8> {
         let bytes = std::iter::repeat_n([0x64; 100], len / 100 + 1).flatten();
         bytes.take(len).collect()

@@ -40,8 +40,7 @@ fn a_newer_mission_is_stored_offered_and_a_view_requested() {
         assert_eq!(met.held(), Some(of));
         assert_eq!(met.events(), [Event::Uploaded]);
         assert_eq!(met.version(), 0, "not flown before it is counted");
-        // There was no message from the other side yet. That neighbour has sent no hello that an offer could answer, so it is
-        // asked for one.
+        // An offer must answer a hello, and the other neighbour has sent none. So the relay asks it for a hello.
         let forms = |node| if node == 3 { FORMS } else { 0 };
         let answer = with_neighbours(1, 1, &hello(base, from, of, FRESH | forms(from)));
         let asks = hello(base, other, of, ASKS | FRESH | forms(other));
@@ -174,7 +173,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer() {
         let expected = expected.map(|message| (5, message.clone()));
         assert_eq!(out, Vec::from_iter(expected), "{holds:?}");
     }
-    // The loaded mission cannot be offered: a node that holds an older one was loaded differently.
+    // The mission before flight cannot be offered: a node with another digest was configured with another mission.
     let other = hello(base, 4, (base.wrapping_sub(1), 0), 0);
     assert_eq!(SignedBench::fourth().receive(1, &other), []);
 }
@@ -210,7 +209,7 @@ fn the_next_node_is_offered_the_mission_before_the_proposal() {
     met.receive(0, &newer);
     met.sent_after(NOW);
     let proposal = |place| proposed(id(1, 1), of, place, 8);
-    // The neighbour has sent no hello that an offer could answer, so it is asked for one.
+    // An offer must answer a hello, and the neighbour has sent none. So the relay asks it for a hello.
     let asks =
         with_neighbours(0, 4, &hello(base, 5, of, ASKS)).with(json!({ "latest_view": id(1, 1) }));
     assert_eq!(met.receive(0, &proposal(3)), [(5, asks)]);
