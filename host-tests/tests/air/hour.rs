@@ -52,8 +52,8 @@ fn availability_in_an_hour_on_a_bad_channel() {
         ("30 %", 0.3, 1.0, 0.999),
         ("50 %", 0.5, 1.0, 0.999),
         ("70 %", 0.7, 1.0, 0.97),
-        ("30 % in runs of 20", 0.3, 20.0, 0.97),
-        ("50 % in runs of 20", 0.5, 20.0, 0.85),
+        ("30 % in bursts of 20", 0.3, 20.0, 0.97),
+        ("50 % in bursts of 20", 0.5, 20.0, 0.85),
     ] {
         let setup = losing(share, burst).soaked(seconds(3_600));
         let hours = run_seeds(&setup, 1..=seeds, |_, outcome| outcome.watched.unwrap()).unwrap();
@@ -99,7 +99,7 @@ fn availability_in_an_hour_on_a_bad_channel() {
 
 /// Random seeds of simulated hours in which one relay repeatedly loses the links to both neighbours.
 ///
-/// These runs test that the relay gets its links back. Half of the frames are lost, in runs of 20. Each silence between the relay's own
+/// These runs test that the relay gets its links back. Half of the frames are lost, in bursts of 20. Each silence between the relay's own
 /// rare requests must not count as another loss. Otherwise the relay would never use its links again, and the chain would be complete for
 /// only 4, 2, 11 and 28 % of the hour. The environment variable `SEEDS` (as `201-800`) overrides the seeds.
 const LONG_SEARCHES: [u64; 4] = [519, 625, 777, 1_030];
