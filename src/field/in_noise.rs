@@ -18,8 +18,7 @@
 
 use super::{Field, FieldPoint};
 
-/// Interference field (known interference along x) together with the receiver noise N, W. Upsilon = E[1/I] becomes
-/// Upsilon / (1 + N Upsilon).
+/// Interference field with receiver noise N, W: `Upsilon / (1 + N Upsilon)`. Upsilon is E[1/I].
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(
@@ -32,7 +31,7 @@ pub struct InNoise<'a> {
 }
 
 impl Field {
-    /// Returns this field combined with a receiver noise of `noise_w` watts, 0 to 1.
+    /// Returns this field with a receiver noise of `noise_w` watts, 0 to 1.
     pub(crate) const fn in_noise(&self, noise_w: f32) -> InNoise<'_> {
         InNoise {
             field: self,
@@ -42,8 +41,7 @@ impl Field {
 }
 
 impl InNoise<'_> {
-    /// Returns Upsilon = E[1/I] with the noise N included, 1/W: `upsilon` / (1 + N `upsilon`). The result is finite,
-    /// because `upsilon` is at most 1e32 and N at most 1.
+    /// Returns `upsilon / (1 + N upsilon)`, 1/W. It is finite: `upsilon` is at most 1e32, N at most 1.
     const fn of(&self, upsilon: f32) -> f32 {
         if self.noise_w > 0.0 {
             upsilon / (1.0 + self.noise_w * upsilon)
@@ -52,8 +50,9 @@ impl InNoise<'_> {
         }
     }
 
-    /// Returns Upsilon = E[1/I] at `x_m` with the receiver noise included, 1/W. The value is interpolated as in
-    /// [`Field::upsilon`].
+    /// Returns Upsilon = E[1/I] with noise at `x_m`, 1/W.
+    ///
+    /// It is interpolated as in [`Field::upsilon`].
     pub const fn upsilon(&self, x_m: f32) -> f32 {
         match self.field.around(x_m) {
             (left, Some(right)) => super::between(self.point(left), self.point(right), x_m),
@@ -61,7 +60,7 @@ impl InNoise<'_> {
         }
     }
 
-    /// Returns the largest Upsilon = E[1/I] of the field with the receiver noise included, 1/W.
+    /// Returns the largest Upsilon = E[1/I] with noise, 1/W.
     pub(crate) const fn largest(&self) -> f32 {
         self.of(self.field.largest)
     }

@@ -33,16 +33,16 @@ use crate::mission::{Interferer, Mission};
 use crate::place::Station;
 use crate::sir::{Sender, square};
 
-/// Hop from Rx to the last relay: the first hop of data from Rx to Tx.
+/// Hop from Rx to the last relay.
 pub(super) struct FromRx {
-    /// Hop from Rx in a mirrored coordinate frame: x is the distance from Rx.
+    /// Hop in a mirrored frame: x is the distance from Rx.
     hop: Hop,
     reverse: f32,
     distance_m: f32,
 }
 
 impl FromRx {
-    /// Returns the hop from Rx to the last relay, `own`. `None` for a mission without data from Rx to Tx.
+    /// Returns the hop from Rx to the last relay, `own`. `None` without data from Rx to Tx.
     pub(super) fn new(mission: &Mission, own: Station) -> Option<Self> {
         let (reverse, distance_m) = (mission.reverse(), mission.config().distance_m);
         if !(reverse > 0.0) {
@@ -71,10 +71,8 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the SIR margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
-    ///
-    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. It is a continuous function
-    /// of `target`.
+    /// Returns the margin `(SIR / required SIR - 1) D` at `x_m`, m. Below 0 if the hop misses `target`. Continuous in
+    /// `target`. D is the Tx-Rx distance.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -83,8 +81,8 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx well enough. `None` if there
-    /// is no such x. Call it only if the SIR from Rx misses `target` at `x_m`.
+    /// Returns the largest x in [`least_m`, `x_m`] that receives Rx well enough, m. `None` if there is none. The SIR
+    /// must miss `target` at `x_m`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -99,8 +97,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay stays farther from Rx if its SIR from Rx is too low. The search starts at x = 650 m,
-    /// a strong interferer is at x = 700 m, and Rx at x = 1000 m.
+    /// Checks that the last relay stays farther away if Rx is too weak. The relay starts at x = 650 m, with an
+    /// interferer at 700 m and Rx at 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

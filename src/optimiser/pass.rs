@@ -28,27 +28,25 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries to receive Rx well enough. Used only with data in both
-/// directions.
+/// Maximum number of last-relay positions tried for reception of Rx. Used only with data in both directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of field points that one call evaluates. The evaluation of one target is completed even if it needs
-/// more.
+/// Maximum number of field points per call. A target once begun is completed.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Previous relay of a pass along the chain, as its message describes it.
+/// Relay whose message arrives now: the previous one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
     /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
-    /// Upsilon, the mean inverse interference power that the previous relay has measured, 1/W. `None` to use the
-    /// mission's interference field. Only passes toward Tx use it.
+    /// Upsilon (mean inverse interference) of the previous relay, 1/W, if measured. `None` for the mission's field.
+    /// Used only toward Tx.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a previous relay with this altitude and power, lateral offset 0, and no measurement.
+    /// Returns a previous relay with lateral offset 0 and no measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -57,38 +55,33 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all data for its reach at a target SIR.
+/// Relay with all data for its farthest x at a target.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
     pub mission: &'a Mission,
-    /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
+    /// Previous relay; `None` for the relay next to Tx or Rx.
     pub behind: Option<Behind>,
-    /// Index of the relay in the chain: 1 for the relay next to Tx, N for the relay next to Rx.
+    /// Index in the chain: 1 next to Tx, N next to Rx.
     pub index: u16,
-    /// Lateral offset, altitude and transmit power of this relay.
+    /// Lateral offset, altitude and power of this relay.
     pub own: Station,
-    /// Upsilon, the mean inverse interference power, measured by the relay, 1/W. `None` to use the mission's
-    /// interference field.
+    /// Upsilon (mean inverse interference) of this relay, 1/W, if measured. `None` for the mission's field.
     pub measured_per_w: Option<f32>,
-    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
-    /// stay short of that x to help the next relay on the pass.
+    /// True if every relay takes its farthest x. False if a relay may stay short to help the next one.
     pub plain: bool,
-    /// Maximum x of the relay, m, which leaves the relays toward Rx room for their separation. Only the joint method
-    /// computes it; `None` with other methods. Not used in an interference field.
+    /// Maximum x with room for the relays toward Rx, m. `None` except in the joint method. Not used in a field.
     pub end_m: Option<f32>,
-    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets there. `None` unless the
-    /// mission has fitted slots (time slots as long as each hop needs).
+    /// Fixed x of this relay, m, if its hop meets the target there. `None` without fitted time slots.
     pub fixed_m: Option<f32>,
 }
 
-/// Returns the x at which a pass starts, repeated for every target, m. It is the x of Tx, or of Rx in an interference
-/// field.
+/// Returns [`origin`](Self::origin) once for every target.
 pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx with an interference field.
+/// Returns the x of the first sender, m: Tx, or Rx in a field.
 pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -97,11 +90,9 @@ pub fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends to `reaches` this relay's reaches for all `targets` whose reach is not in the list yet.
-    ///
-    /// `targets` is in ascending order, and entry i of each list belongs to target i. `from` has the reaches of the
-    /// previous relay of the pass, m. The list ends before the first target that cannot be met. Work for each target:
-    /// one computation of a hop; in an interference field, up to three for each point of the field.
+    /// Appends this relay's reach for each target not in `reaches` yet. `targets` ascend; entry i of each list is for
+    /// target i. `from` has the previous relay's reaches, m. The list ends before the first missed target. Work per
+    /// target: one hop; in a field up to three per field point.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -144,9 +135,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
-    /// computes 16 reaches. In an interference field it computes as many reaches as take 128 evaluations of the
-    /// field's points, but at least one.
+    /// Continues [`extend`](Self::extend) by bounded work; true at the end. One call: 16 reaches; in a field 128 point
+    /// evaluations, at least one reach.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -161,8 +151,8 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. Both
-    /// directions must meet it, and two relays must be in order and separated.
+    /// Returns true if the hop from `from_m` to `x_m` meets `target`. Both directions must; relays must be in order and
+    /// separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -224,15 +214,14 @@ impl<'a> Link<'a> {
         }))
     }
 
-    /// Returns the maximum x of the previous relay in a pass toward Tx, m.
-    ///
-    /// Relays nearer to Rx need no separation in x: at different altitudes they can be above each other.
+    /// Returns the maximum x of the previous relay toward Tx, m. Relays nearer to Rx need no separation in x: altitudes
+    /// can differ.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop that allows this relay, its sender, the smallest x. The hop's receiver is at x from `low` to
-    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop with the smallest x of this relay, its sender. The receiver is at `low` to `high`, m; if
+    /// `plain`, at `low`. `None` if none meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -253,12 +242,9 @@ impl<'a> Link<'a> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
-    ///
-    /// `reach` is this relay's reach, and `from_m` the reach of the previous relay. `None` if Rx is out of reach from
-    /// everywhere. For a pass toward Rx the slack is `reach` plus the maximum length of the last hop, minus D. For a
-    /// pass toward Tx the slack is the maximum length of the first hop minus this relay's x; the x is chosen so that
-    /// the slack is largest.
+    /// Returns the slack for `target`, and this last relay's x, m. `reach` is this relay's, `from_m` the previous
+    /// one's. Toward Rx: `reach` plus the last hop's maximum length, minus D. Toward Tx: the first hop's maximum length
+    /// minus the x, best chosen. `None` if Rx is out of reach from everywhere.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -307,8 +293,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m`, m, at which this relay receives the pass's previous relay. The previous
-    /// relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x up to `most_m` that receives the previous relay, m. That relay may be anywhere up to
+    /// `from_m`. `None` if there is none.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -316,9 +302,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for data in both directions. `hop` leads from Rx to this
-    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if its
-    /// SIR from Rx would be too low there.
+    /// Returns the slack and this last relay's x, m, for both directions. `hop` leads from Rx to here; `slack` is that
+    /// toward Rx for an x. The relay stays short of `reach` if Rx would be too weak there.
     fn held(
         &self,
         hop: &FromRx,
@@ -349,11 +334,9 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
-    ///
-    /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
-    /// position. The search assumes that the possible positions of the previous relay are one interval, although this
-    /// interval can have gaps. Work: at most two reaches; in an interference field three for each of its points.
+    /// Returns the x that the previous relay must take, if this one is at `place`. `from_m` is the reach before the
+    /// previous relay. `None` if there is no such x. Possible positions are assumed to be one interval without gaps.
+    /// Work: at most two reaches; in a field three per field point.
     pub fn required_position(
         &self,
         target: f32,
@@ -416,8 +399,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the reaches
-/// of this relay, and `from` those of the previous relay of the pass, m.
+/// Returns the last relay's result for all targets. `reaches` are those of `link`, `from` those of the previous relay,
+/// m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -429,22 +412,18 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
+/// Result for a list of targets: slacks, and the committed target.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the committed target in the pass's list of targets. The relays take their positions for this target.
-    /// `None` if no target is committed and the search goes on.
+    /// Index of the committed target; `None` while the search goes on.
     pub commit: Option<u8>,
-    /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
-    /// target.
+    /// Slack for each target that every hop can meet, m. 0 or more if the chain meets it.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
-    /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's slacks, m, one for each of its `targets`.
-    ///
-    /// The highest target that the chain meets is committed in two cases: the next higher target is missed and within the mission's
-    /// tolerance; or the ladder has a single target, as in the paper's Algorithm 1.
+    /// Returns the result for the targets of `ladder`; `slacks` are in m. The highest met target is committed in two
+    /// cases. The next one is missed and within the tolerance, or the ladder has one target.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -471,8 +450,8 @@ impl Verdict {
     }
 }
 
-/// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
-/// is 0 or more. In a varying field, or with different altitudes, lower targets can be missed; they count all the same.
+/// Returns the number of targets up to the highest met; 0 if none. Met means a slack of 0 or more. Lower missed targets
+/// count as met.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -480,7 +459,7 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
         .map_or(0, |last| last + 1)
 }
 
-/// Computation of a whole chain for one target, in one program and without messages.
+/// Whole chain for one target, without messages.
 #[derive(Debug)]
 pub struct Walk<'a, F> {
     pub mission: &'a Mission,
@@ -499,7 +478,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns this chain with relays that all take their farthest x.
+    /// Returns this chain with all relays at their farthest x.
     pub const fn plainly(&self) -> Self {
         Self::new(self.mission, self.target, true, self.profile_of)
     }
@@ -518,9 +497,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
-    ///
-    /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
+    /// Returns index, previous reach and own reach of each relay, m. The list ends at a hop that misses the target.
     pub fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
         let mut reach = origin(self.mission);
         let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
@@ -531,8 +508,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. `index` is 0
-    /// for no relay: the result is then `Some` if all relays can take their reaches.
+    /// Returns the reach of relay `index`, m, if all can take theirs. `None` otherwise. Index 0 only checks.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -551,8 +527,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         None
     }
 
-    /// Returns the reach of relay `index`, m. If `index` is `None`, it returns the x at which the pass starts. The
-    /// result is `None` if a hop cannot meet the target.
+    /// Returns the reach of relay `index`, m; for `None` the first sender's x. `None` if a hop cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let Some(index) = index else {
             return Some(origin(self.mission));
@@ -561,8 +536,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. `index` is 0 for no
-    /// relay: the result is then `Some` if all relays can take their required positions.
+    /// Returns the x of relay `index`, m, if all required positions are possible. `None` otherwise. Index 0 only
+    /// checks.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -584,12 +559,9 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
-    /// x = `place`, m.
-    ///
-    /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
-    /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
-    /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
+    /// Computes all positions, from the last relay, at `place` m, to the first. `visit` gets a relay's index, its x,
+    /// and the previous relay's index. It returns that relay's reach, m; for `None` the first sender's x. Returns the x
+    /// before the first relay. `None` if a required position is impossible, or `visit` returns `None`.
     pub fn settle(
         &self,
         place: f32,
@@ -609,7 +581,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     }
 }
 
-/// Returns the index of the last relay of a pass.
+/// Returns the index of the relay that computes last.
 const fn last(mission: &Mission) -> u16 {
     match mission.heading() {
         Heading::TowardRx => mission.relays(),

@@ -9,13 +9,13 @@
 
 use super::frame::MAX_DECODED;
 
-/// Reason why the bytes between two delimiters are no frame.
+/// Reason why bytes between two delimiters are no frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// The received frame is longer than the maximum.
+    /// Frame longer than the maximum.
     Oversized,
-    /// A delimiter came inside a COBS block: the end of the frame is missing.
+    /// Delimiter inside a COBS block: the frame's end is missing.
     Truncated,
 }
 
@@ -24,20 +24,20 @@ error_texts!(DeframeError {
     Truncated => "the frame ended inside a COBS block",
 });
 
-/// Decoder that splits a byte stream into frames and undoes their COBS encoding.
+/// Decoder that splits a byte stream into frames and undoes COBS.
 #[derive(Clone, Debug)]
 pub struct Deframer {
     plain: [u8; MAX_DECODED],
     len: usize,
-    /// Remaining bytes of the current COBS block; 0 if a code byte is next.
+    /// Remaining bytes of the COBS block; 0 before a code byte.
     run: u8,
-    /// True if the decoder has to insert a zero after the current COBS block. At the end of the frame no zero is inserted.
+    /// True to insert a zero after the COBS block, except at the frame's end.
     zero_after: bool,
     oversized: bool,
 }
 
 impl Deframer {
-    /// Creates a decoder that expects the first byte of a frame.
+    /// Creates a decoder before the first byte of a frame.
     pub const fn new() -> Self {
         Self {
             plain: [0; MAX_DECODED],
@@ -48,9 +48,9 @@ impl Deframer {
         }
     }
 
-    /// Decodes one byte; at a delimiter returns the frame or an error. Constant work.
+    /// Decodes one byte; at a delimiter returns the frame or an error.
     ///
-    /// Consecutive delimiters are neither frames nor errors.
+    /// Consecutive delimiters are neither. Constant work.
     ///
     /// # Errors
     /// [`DeframeError`], once, at the delimiter that ends the invalid frame.
@@ -71,9 +71,8 @@ impl Deframer {
         None
     }
 
-    /// Decodes bytes up to the end of the current COBS block or a delimiter; returns the remaining bytes.
-    ///
-    /// Same effect as [`push`](Self::push) for each decoded byte, in a quarter of the instructions.
+    /// Decodes bytes up to a COBS block's end; returns the rest. Like [`push`](Self::push) for each byte, in a quarter
+    /// of the instructions.
     pub fn push_run<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
         let free = self.plain.get_mut(self.len..).unwrap_or_default();
         let mut stored: u8 = 0;

@@ -27,31 +27,30 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions that a pass tries for each relay: the current one, and two in either direction.
+/// Number of positions tried per relay: the current one, two either way.
 const STATES: usize = 5;
-/// Moves of a relay that a pass tries, in units of the current step width. Of equally good moves the first in this list
-/// is preferred.
+/// Tried moves, in step widths. Of equally good moves the first wins.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits that store the choice among the five states of the previous relay.
+/// Number of bits that store one of the five states.
 const BITS: usize = 3;
 
-/// Step width at which the search from one initial chain ends, in units of D.
+/// Step width that ends the search from one initial chain, in units of the Tx-Rx distance.
 const NARROWEST: f32 = 1.0 / 131_072.0;
-/// Relative gain of a round of passes below which the step width is halved.
+/// Relative improvement below which the step width is halved.
 const LITTLE: f32 = 1e-3;
-/// Maximum number of rounds of passes over one initial chain.
+/// Maximum number of rounds from one initial chain.
 const ROUNDS: u8 = 200;
 
-/// Number of relays per call in a pass of the solver.
+/// Number of relays per call while moves are tried.
 const AT_ONCE: u16 = 3;
-/// Number of relays per call in all other work of the solver.
+/// Number of relays per call in all other work.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to each squared hop length, in units of D^2, so that no hop time is 0.
+/// Amount added to a squared length, in units of the squared Tx-Rx distance: no hop time is 0.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first and last x of the relays, and first step width of the moves, in units of D. If both x are
-/// equal, the relays start there at their minimum separation.
+/// Initial chains: first x, last x, first step width, in units of the Tx-Rx distance. Equal x mean that the relays
+/// gather there at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -62,48 +61,49 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Index, from 0, of the initial chain that starts from the best chain found along the line Tx to Rx. Used only if
-/// relays may leave the common altitude or the line.
+/// Index of the initial chain that begins with the best one so far. Used only if a lateral offset or altitude is free.
 const BEST: u8 = 8;
-/// First step width of the moves from the best chain along the line, in units of D.
+/// First step width of the initial chain [`BEST`], in units of the Tx-Rx distance.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of further initial chains, as fractions of two ranges. The first range is from 0 to the
-/// largest lateral offset away from the interferer, the second from the common altitude to the highest altitude.
+/// Lateral offset and altitude of further initial chains, as fractions. The ranges: 0 to the largest offset away from
+/// the interferer, common to highest altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Fitted slots of the hops next to a relay: begin and end of each, as fractions of the frame, 0 to 1.
+/// Time slots of a relay's hops, each begin and end a fraction of the frame.
 ///
-/// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
-/// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
-/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio the
-/// length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about 6e-8,
-/// so a shorter slot can become empty.
+/// The fractions are 0 to 1, multiples of about 6e-8; a shorter slot can become empty. The slots follow one another:
+/// toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then back from hop N + 1 to hop 1. A slot begins where the slot
+/// before it ends, to the bit. Tx and Rx compute nothing: their slots are `from_tx` and `to_tx` of the first relay,
+/// `to_rx` and `from_rx` of the last. For a radio, all nodes also need the length of the frame and a common clock.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
-    /// Begin and end of the slot in which this relay sends to the next node toward Rx.
+    /// Slot in which this relay sends toward Rx.
     pub to_rx: [f32; 2],
-    /// Begin and end of the slot in which this relay sends to the next node toward Tx. In a mission of one direction
-    /// both are 1: the slot is empty.
+    /// Slot in which this relay sends toward Tx.
+    ///
+    /// Empty, both 1, in a mission of one direction.
     pub to_tx: [f32; 2],
-    /// Begin and end of the slot in which this relay receives from the next node toward Tx.
+    /// Slot in which this relay receives from the node toward Tx.
     pub from_tx: [f32; 2],
-    /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission of one
-    /// direction both are 1: the slot is empty.
+    /// Slot in which this relay receives from the node toward Rx.
+    ///
+    /// Empty, both 1, in a mission of one direction.
     pub from_rx: [f32; 2],
-    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
-    /// times this.
+    /// Data rate of the chain to Rx, divided by the bandwidth, bit/s/Hz.
+    ///
+    /// The data rate back to Tx is `reverse` times this.
     pub bits_per_hz: f32,
 }
 
-/// Position tried for a node, and the inverse interference there, which is 1 at Tx and Rx.
+/// Tried position, and the inverse interference there: 1 at Tx and Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
     quiet: f32,
 }
 
-/// Position tried for one relay, and the shortest total time of the hops from Tx up to that relay.
+/// Tried position of a relay, and the shortest time from Tx.
 #[derive(Clone, Copy, Debug)]
 struct State {
     spot: Spot,
@@ -120,18 +120,18 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains, r, and the minimum separation. r is the data rate back divided by the data rate to
-/// Rx. `gains` has the forward and the backward gain, each divided by the SNR gap.
+/// Hop: its gains, r, and the minimum separation. r is the data rate back divided by that to Rx. `gains` are forward
+/// and backward, divided by the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
     reverse: f32,
-    /// Minimum squared distance of the two relays, in units of D^2. `None` if an end of the hop is Tx or Rx.
+    /// Minimum squared distance, in units of the squared Tx-Rx distance; `None` at Tx or Rx.
     apart: Option<f32>,
 }
 
 impl Hop {
-    /// Returns the forward and the backward SINR, linear, each divided by the SNR gap.
+    /// Returns the forward and backward SINR, divided by the SNR gap.
     fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
         let l = square(x) + square(y) + square(h) + SHORTEST;
@@ -139,8 +139,7 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times to send one bit toward Rx and r bits back. Both are infinite if two relays are too close or
-    /// out of order.
+    /// Returns the times for one bit toward Rx and r bits back. Infinite if two relays are too close or out of order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
@@ -164,51 +163,49 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of the positions of an initial chain, some relays at a time. The field is the number of relays done.
+    /// Positions of an initial chain. The field counts the relays done.
     Begin(u16),
-    /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
-    /// the next node to process: 1 for the first relay, N + 1 for Rx.
+    /// Forward: the fastest moves from Tx to each node. The field is the next node, 1 to N + 1 (Rx).
     Pass(u16),
-    /// Backward pass, from the last relay to the first: moves the relays as in the best combination. The fields are the
-    /// next relay to move, and the index of its move in [`MOVES`].
+    /// Backward: moves the relays by the best combination. The fields are the next relay and its move's index in
+    /// [`MOVES`].
     Back(u16, u8),
-    /// Summation of the hop times of the best chain, and search for its lowest SIR. The field is the next node.
+    /// Sums of hop times, and the lowest SIR. The field is the next node.
     Sum(u16),
 }
 
-/// Solver of a chain with fitted slots: time slots as long as each hop needs. It maximises the data rate.
+/// Solver of a chain with fitted slots: the largest data rate.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
-    /// Gains of the hops from relays of 1 W, each divided by the SNR gap.
+    /// Gains from relays of 1 W, divided by the SNR gap.
     gains: Gains,
-    /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
+    /// Positions of the current chain, in units of the Tx-Rx distance.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. At the end of the search, two sums of hop times from Tx to the relay, toward Rx and
-    /// back, replace each relay's x and y.
+    /// Positions of the best chain. At the end x and y hold sums of hop times from Tx, forward and back.
     best_places: [Triple; RELAYS],
-    /// Best state of the previous relay for each of a relay's five states: three bits each.
+    /// Best state of the previous relay for each state, three bits each.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
-    /// Number of the current initial chain, from 0.
+    /// Number of the initial chain, from 0.
     number: u8,
     rounds: u8,
-    /// Coordinate that the current pass changes: 0 for x, 1 for y, 2 for the altitude.
+    /// Coordinate that changes now: 0 for x, 1 for y, 2 for altitude.
     axis: u8,
     width: f32,
-    /// Total hop time of the current chain, which is to be minimised. Infinite if relays are too close.
+    /// Total hop time of the current chain. Infinite if relays are too close.
     time: f32,
-    /// Total hop time of the chain before the current round of passes.
+    /// Total hop time before the current round.
     before: f32,
-    /// Total hop time of the best chain found; 0 until a chain is found.
+    /// Total hop time of the best chain; 0 before the first.
     best: f32,
-    /// Sum of all hop times of the solved chain, toward Rx and back to Tx.
+    /// Sums of the hop times toward Rx and back to Tx.
     sums: [f32; 2],
     worst: f32,
 }
 
 impl<const RELAYS: usize> Fitted<RELAYS> {
-    /// State of the solver before its first call. All its bytes are 0, so it takes no flash.
+    /// State before the first call: all bytes 0, no flash.
     pub(super) const NEW: Self = Self {
         gains: Gains::NONE,
         places: [[0.0; 3]; RELAYS],
@@ -227,8 +224,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         worst: 0.0,
     };
 
-    /// Continues the solution by one bounded portion. `Ready` once the chain is solved, with the linear SIR of the
-    /// worst hop.
+    /// Continues by one bounded portion. `Ready` with the linear SIR of the worst hop.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let relays = chain.relays();
         match self.work {
@@ -263,8 +259,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    /// Moves relays to their positions in the current initial chain. They are up to [`OTHERS_AT_ONCE`] relays after the
-    /// first `done`. The first pass over the chain follows after the last relay.
+    /// Places up to [`OTHERS_AT_ONCE`] relays after the first `done`.
     fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
         let relays = chain.relays();
@@ -318,8 +313,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns the position of node `index`, moved along the current coordinate by `by`. The node stays within its
-    /// limits. Index 0 is Tx, and N + 1 is Rx.
+    /// Returns node `index` moved by `by` along the current coordinate. It stays within its limits. 0 is Tx, N + 1 is
+    /// Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
@@ -387,8 +382,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         self.work = Work::Pass(end);
     }
 
-    /// Continues after a pass whose best combination of moves has the total hop time `time`. The last relay is in
-    /// `state`.
+    /// Continues after the best moves take the total hop time `time`. The last relay is in `state`.
     fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
@@ -398,7 +392,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Moves relays to their best positions, from relay `index` (which is in `state`) toward Tx.
+    /// Moves relays to their best positions, from relay `index` toward Tx. Relay `index` is in `state`.
     fn back(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, state: u8) {
         let end = index.saturating_sub(OTHERS_AT_ONCE);
         let mut state = usize::from(state);
@@ -416,9 +410,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the coordinate and the step width of the next pass over the relays. A pass changes one coordinate of all
-    /// relays. After the last pass from an initial chain, the function stores the chain if it is the best so far, and
-    /// goes on to the next initial chain.
+    /// Selects the next coordinate and step width. After the last, it stores a better chain and starts the next one.
     fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;
@@ -450,7 +442,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the lower SIR of the hop.
+    /// Returns both times of the hop to node `index`. Lowers `worst` to the hop's SIR.
     fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
@@ -466,8 +458,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are fractions of the
-    /// frame. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
+    /// Returns the end of hop `hop`'s slot toward Rx, and the begin of its slot back. Both are fractions of the frame.
+    /// Hop 0 gives 0 and 1; `hop` is at most N + 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {
@@ -483,7 +475,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         [end.min(middle), 1.0 - share(back)]
     }
 
-    /// Returns the position of relay `index`, and its slots, once the chain is solved.
+    /// Returns position and slots of relay `index` in the solved chain.
     pub(super) fn place(
         &self,
         chain: &Chain<'_, impl SeatOf>,
@@ -511,7 +503,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains. More chains are tried if several lateral offsets or altitudes are allowed.
+/// Returns the number of initial chains; more if offsets or altitudes are free.
 fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {

@@ -21,10 +21,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Computes the policies (moves) of the relays in `segment`. Returns the value function of the relay before the
-    /// segment, which is at `before`.
-    ///
-    /// `None` if a hop cannot meet the target. Bounded by ten relays.
+    /// Computes the moves of `segment`'s ten relays. Returns the value function of the relay before it, at `before`.
+    /// `None` if a hop cannot meet the target.
     pub(super) fn recall(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -91,7 +89,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the position of the relay before `segment` in the current chain.
+    /// Returns the position of the relay before `segment`.
     pub(super) fn nominal_before(&self, chain: &Chain<'_, impl SeatOf>, segment: u8) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
@@ -105,8 +103,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Continues the forward pass by one segment, or first computes the moves of its relays. The pass tries the
-    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept` is true.
+    /// Continues to move relays by one segment, or computes its moves first. Tries the fraction `share` with the target
+    /// `sigma`; `kept` stores the chain.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -147,8 +145,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share` of their computed moves. Stores their new lateral offsets
-    /// and altitudes if `kept` is true. `None` if a hop cannot meet `target`.
+    /// Moves the relays of `segment` by the fraction `share`. `kept` stores the results. `None` if a hop cannot meet
+    /// `target`.
     pub(super) fn follow(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -182,17 +180,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays per call in a pass that computes only their x.
+/// Number of relays per call when only x is computed.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty for relays too near the interferer at which an improved chain counts as feasible. The unit is the
-/// distance from Tx to Rx.
+/// Largest penalty of a feasible improved chain, in units of the Tx-Rx distance.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and
-    /// altitudes stay unchanged. Stores the chain if `kept` is true. At the end of the pass returns the chain's slack,
-    /// m, or `None` if a hop cannot meet the target.
+    /// Continues to compute only the x, for the target `sigma` = ln(SIR). `kept` stores the chain. At the end the
+    /// slack, m; `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -229,8 +225,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index` with its hop from a relay at `from`. Initial chains of the kind [`Start::Through`] have no
-    /// minimum separation.
+    /// Returns relay `index` with its hop from `from`. [`Start::Through`] has no minimum separation.
     pub(super) fn link<'a>(
         &self,
         chain: &Chain<'a, impl SeatOf>,
