@@ -130,8 +130,8 @@ impl Channel {
         )
     }
 
-    /// Creates a channel from its path-loss factors, 1/m^2. `None` unless `mu_los` is 1e-3 to 1e30, `mu_nlos` 1 to 1e20
-    /// times that, and `eta` between.
+    /// Creates a channel from its factors, 1/m^2; `None` if out of range. `mu_los` is 1e-3 to 1e30, `mu_nlos` 1 to 1e20
+    /// times that, `eta` between.
     pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
         let sound = (1e-3..=1e30).contains(&mu_los)
             && (mu_los..=1e20 * mu_los).contains(&mu_nlos)
@@ -143,8 +143,7 @@ impl Channel {
         })
     }
 
-    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`]. Rounding can put it outside;
-    /// [`Channel::from_factors`] would refuse.
+    /// Returns the channel with eta between the other factors. Rounding can put it outside.
     pub(crate) fn ordered(self) -> Self {
         Self {
             eta: self.eta.max(self.mu_los).min(self.mu_nlos),

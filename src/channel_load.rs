@@ -23,18 +23,18 @@ use crate::wire::MAX_SWEEP;
 /// Frames of two neighbours within `probe_after`, while positions hold.
 const FRAMES: u64 = 8;
 
-/// Length of a frame of an idle chain, bytes: a signed lease renewal.
+/// Length of a signed lease renewal, bytes.
 const BYTES: u64 = 32;
 
-/// Maximum part of the channel for an idle chain: 3/20. The rest is for other messages, retransmissions and waits.
+/// Maximum part of the channel for an idle chain: 3/20.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Number of relays in range that find the channel free. Every further nine add one frame time per transmission.
+/// Relays in range that find the channel free. Every further nine add one frame time.
 const NEAR: u16 = 9;
 
-/// Maximum assumed time of a transmission with wait, in frame times.
+/// Maximum time of a transmission with wait, in frame times.
 const MOST_TURNS: u32 = 4;
 
 /// Load of a radio channel: relays that share it, and overhead per frame.
@@ -58,8 +58,7 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the needed bits per `probe_after`, times 1e6. Divided by `probe_after` in microseconds: the minimum
-    /// bit/s.
+    /// Returns the needed bits per `probe_after`, times 1e6.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
@@ -159,7 +158,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the assumed time of a transmission with wait, in frame times.
+    /// Returns the time of a transmission with wait, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,

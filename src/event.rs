@@ -155,7 +155,7 @@ pub enum Event {
     ///
     /// See `Relay::set_reserve`. Raised again every minute while that lasts.
     AtReserve,
-    /// This relay has told a node outside the chain that it may fly away.
+    /// Permission of this relay: a node outside the chain may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event
     /// may be repeated.
@@ -272,7 +272,7 @@ impl Pending {
         self.events |= Self::bit(event);
     }
 
-    /// Raises an event about `node` at `side`. It replaces one of the same kind and side about another node.
+    /// Raises an event. It replaces one of the same kind and side.
     pub(crate) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         let at = usize::from(side == Side::Downstream);
         let (Some(bits), Some(nodes)) = (self.kinds.get_mut(at), self.nodes.get_mut(at)) else {

@@ -69,7 +69,7 @@ pub struct Sites {
 pub(crate) const SITES_LENGTH: usize = 24;
 
 impl Sites {
-    /// Encodes latitude, longitude and height of Tx, then of Rx. Each has four little-endian bytes.
+    /// Encodes Tx, then Rx, as little-endian integers.
     pub(crate) fn to_bytes(self) -> [u8; SITES_LENGTH] {
         let Self { tx, rx } = self;
         let numbers = [

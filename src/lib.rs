@@ -14,7 +14,7 @@
 )]
 
 /// Implements `Display`, `Error` and `defmt::Format` for an error enum. `defmt` accepts string literals only, and keeps
-/// them out of flash. `text` is a `const fn`: a `const fn` that panics can use it.
+/// them out of flash.
 macro_rules! error_texts {
     ($type:ty { $($variant:ident => $text:literal),* $(,)? }) => {
         impl $type {
@@ -105,7 +105,7 @@ mod wire;
 #[doc(hidden)]
 pub mod wire;
 
-/// Features of this build, as constants. Code behind a false one is compiled, but takes no flash.
+/// Features of this build. Code behind a false one takes no flash.
 mod features {
     pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
     pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");

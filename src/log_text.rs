@@ -36,7 +36,7 @@ impl defmt::Format for Event {
     }
 }
 
-/// Returns the node of an event; `None` if it has none.
+/// Returns the node of an event, if any.
 const fn node(event: Event) -> Option<u16> {
     match event {
         Event::NeighbourLost { node, .. }
@@ -52,7 +52,7 @@ const fn node(event: Event) -> Option<u16> {
     }
 }
 
-/// Returns the log text of an event. For an event about a node, its number comes before.
+/// Returns the log text of an event; its node comes before.
 fn text(event: Event) -> defmt::Str {
     match event {
         Event::SetpointChanged => defmt::intern!("the setpoint has changed"),
@@ -232,7 +232,7 @@ mod autopilot {
         }
     }
 
-    /// Returns the entries before the first 0; unused ones are 0.
+    /// Returns the entries before the first 0.
     fn named(relays: &[u16]) -> &[u16] {
         relays.split(|node| *node == 0).next().unwrap_or_default()
     }

@@ -112,7 +112,7 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the waiting position without a quorum; `place` is the last agreed one.
+    /// Returns the waiting position; `place` is the last agreed one.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

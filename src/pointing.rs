@@ -91,7 +91,7 @@ fn length(a: f32, b: f32) -> f32 {
     }
 }
 
-/// Returns the angle with the tangent `opposite / adjacent`, rad. The signs give the quadrant. 0 if both are 0.
+/// Returns the angle of (`adjacent`, `opposite`), rad; 0 if both are 0.
 fn angle(opposite: f32, adjacent: f32) -> f32 {
     let large = opposite.abs().max(adjacent.abs());
     if large > 0.0 {

@@ -4,9 +4,8 @@
 //! takes 81 instructions. This one derives a first estimate from the exponent and improves it by Heron's rule on the
 //! FPU. It uses additions, multiplications and divisions only, so every target gives the same bits.
 
-/// Returns the square root, within one unit in the last place. 0 below the smallest normal f32. Takes 18 instructions
-/// on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` tests two octaves: a factor of 4 changes only the
-/// exponent.
+/// Returns the square root, within one unit in the last place. 0 below the smallest normal f32. 18 instructions on a
+/// Cortex-M4F.
 #[inline(never)] // called from many places: 2.4 KB of flash otherwise
 pub fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)
@@ -30,8 +29,7 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
     0.5 * (y + x / y)
 }
 
-/// Halves the interval `low` to `high` `steps` times; returns its ends. `holds` must be true at `low` and false at
-/// `high`.
+/// Halves the interval `steps` times; returns its ends. `holds` must be true at `low` and false at `high`.
 pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bool) -> (f32, f32) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {
@@ -45,8 +43,7 @@ pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bo
     (low, high)
 }
 
-/// Power ratio as a sum of two f32, exact near a target. The paper uses gamma - A. A single f32 would lose up to 6e-8
-/// A.
+/// Power ratio as a sum of two f32, exact near a target. One f32 would lose up to 6e-8 A in gamma - A.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PowerRatio {
@@ -81,7 +78,7 @@ impl PowerRatio {
         target / self.hi
     }
 
-    /// Returns `target / A - 1`; A is this ratio. Relative error below 2e-7, even if `target` is nearly A.
+    /// Returns `target / A - 1`. Relative error below 2e-7, even near A.
     pub const fn excess(self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
     }

@@ -40,7 +40,7 @@ pub enum Wiring {
     /// Separate link to each neighbour: two serial ports.
     #[default]
     Pair,
-    /// One channel that both neighbours receive: one radio.
+    /// Single channel that both neighbours receive: one radio.
     Shared,
 }
 
@@ -201,8 +201,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns true if these settings allow the time slots of `config`. Fitted slots need the method `Joint` and a
-    /// known interferer.
+    /// Returns true if these settings allow the slots of `config`. Fitted slots need `Joint` and a known interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;
@@ -292,7 +291,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with the minimum `hop_time` for `baud` bit/s and `load`, or longer.
+    /// Returns the settings with at least the needed `hop_time`.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {

@@ -17,9 +17,9 @@ pub enum Heading {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Toward Tx.
+    /// Direction toward Tx.
     Upstream,
-    /// Toward Rx.
+    /// Direction toward Rx.
     Downstream,
 }
 
@@ -32,7 +32,7 @@ impl Side {
         }
     }
 
-    /// Returns where messages in the direction `heading` come from. Replies are sent there.
+    /// Returns where messages come from; replies go there.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

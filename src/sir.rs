@@ -13,9 +13,8 @@ use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::root::{PowerRatio, bisected, sqrt};
 
-/// Returns the inverse interference at `at`, a factor of a hop's SIR. SIR = gain x factor / squared length. Interferer
-/// at (X, Y): `s / (1 + nu s)` with `s = (X - x)^2 + (Y - y)^2 + h^2`, m^2. nu is the noise. Field: `Upsilon(x) /
-/// Upsilon_max`, with noise.
+/// Returns the inverse interference at `at`: SIR = gain x it / squared length. Interferer: `s / (1 + nu s)`,
+/// `s = (X - x)^2 + (Y - y)^2 + h^2`, m^2. Field: `Upsilon(x) / Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -30,8 +29,7 @@ pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     }
 }
 
-/// Returns `s / (1 + nu s)`, m^2: the inverse of interference plus noise. `s` is the squared distance from the
-/// interferer, m^2, `nu` the noise, 1/m^2.
+/// Returns the inverse of interference plus noise, `s / (1 + nu s)`, m^2.
 pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
     if nu > 0.0 { s / (1.0 + nu * s) } else { s }
 }
@@ -61,7 +59,7 @@ impl Sender {
         }
     }
 
-    /// Returns Rx, node N + 1, as the sender toward Tx.
+    /// Returns Rx, node N + 1, as a sender.
     pub fn receiver(mission: &Mission) -> Self {
         let config = mission.config();
         let relative = f64::from(config.rx_power_w) / f64::from(config.tx_power_w);
@@ -92,21 +90,21 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at Rx for a relay of `power_w` watts at `from`. The paper's `SIR_{N+1}`: [`Mission::receiver_gain`]
-/// / squared distance to Rx.
+/// Returns the SIR at Rx for a relay of `power_w` watts. `SIR_{N+1}` of the paper: [`Mission::receiver_gain`] / squared
+/// distance.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
     mission.receiver_gain(power_w) / (square(distance) + across)
 }
 
-/// Returns the SIR at Tx for a relay of `power_w` watts at `from`. 0 while the interferer is unknown.
+/// Returns the SIR at Tx for a relay of `power_w` watts. 0 while the interferer is unknown.
 pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let across = square(from.y_m) + square(from.altitude_m);
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns the factor K of the hop to Tx, m^2: SIR = K / squared length.
+/// Returns the factor K, m^2: SIR at Tx = K / squared length.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"
@@ -131,12 +129,11 @@ pub const fn square(x: f32) -> f32 {
     x * x
 }
 
-/// Number of bisection steps for the best x of the first hop.
+/// Number of bisection steps for the best x.
 const HALVINGS: u8 = 32;
 
 /// Returns the x of the largest first-hop SIR, m, for X < 0. The slope has the sign of `X x - q - X h^2 / x - nu s^2`,
-/// which falls with x: one maximum. `s = (X - x)^2 + Y^2 + h^2`, `q = X^2 + Y^2`. Without noise it is a root of a
-/// quadratic; with noise it is closer to Tx: bisection.
+/// which falls with x. `s = (X - x)^2 + Y^2 + h^2`, `q = X^2 + Y^2`. With noise it is closer to Tx.
 fn first_hop_peak(mission: &Mission, interferer: &Interferer, altitude_m: f32) -> f32 {
     let Interferer { x_m, y_m, .. } = *interferer;
     let (q, b) = (square(x_m) + square(y_m), square(altitude_m));
@@ -153,11 +150,10 @@ fn first_hop_peak(mission: &Mission, interferer: &Interferer, altitude_m: f32) -
     bisected(0.0, peak, HALVINGS, rises).0
 }
 
-/// Returns the largest SIR of the first hop at `altitude_m`, over all x. For X >= 0 it is at x = 0 (the paper's Lemma
-/// 2, `gamma_0`): anywhere else s / (x^2 + h^2) is smaller. With noise: where s is larger, 1 / (1 + nu s) is smaller;
-/// where s is smaller, s / (1 + nu s) is smaller and x^2 + h^2 larger. For X < 0 there is one maximum along x, at most
-/// at Rx. In a field the result is an upper bound: right above Tx with the largest Upsilon. It is larger at lower
-/// altitudes.
+/// Returns the largest SIR of the first hop at `altitude_m`, over all x. For X >= 0 it is at x = 0 (Lemma 2,
+/// `gamma_0`): elsewhere `s / (x^2 + h^2)` is smaller. Noise: larger s has a smaller `1 / (1 + nu s)`; smaller s a
+/// smaller `s / (1 + nu s)` and larger `x^2 + h^2`. For X < 0 there is one maximum, at most at Rx. In a field it is an
+/// upper bound. It is larger at lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

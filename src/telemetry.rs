@@ -67,7 +67,7 @@ const PHASES: [Phase; 8] = [
     Phase::NoQuorum,
 ];
 
-/// Control states by their numbers in a report, from 1. [`REFUSED`] is the last.
+/// Control states by number in a report, from 1 to [`REFUSED`].
 const CONTROLS: [State; 6] = [
     State::Silent,
     State::Grounded,
@@ -91,7 +91,7 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the node that the relay ignores; `None` for none. `first` is 1 for another mission, 9 for another key.
+/// Returns the ignored node, if any. `first` is 1 for another mission, 9 for another key.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),
@@ -100,7 +100,7 @@ fn refused(entry: &Entry, first: u16) -> Option<u16> {
     }
 }
 
-/// Returns element `number` of `all`, from 1; `None` if there is none.
+/// Returns element `number` of `all`, from 1.
 fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
     all.get(usize::from(number).checked_sub(1)?).copied()
 }

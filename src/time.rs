@@ -95,20 +95,20 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Largest backward step that counts as calls in the wrong order. A larger one is a change of the caller's clock.
+/// Largest backward step that counts as calls in wrong order.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum advance per call, about 140 years. A wrong reading could otherwise stop all timers for ever.
+/// Maximum advance per call: a wrong reading stops no timer.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
-/// Clock of internal time, which never runs backward; the caller's may.
+/// Clock of internal time, which never runs backward.
 ///
 /// | caller's time | internal time |
 /// | --- | --- |
 /// | up to 140 years after the latest | advances as much |
 /// | later than that | advances by 140 years |
 /// | up to 100 ms before the latest | stands still until the caller's time has caught up |
-/// | earlier than that | goes on from the latest, in step with the caller's time from now on |
+/// | earlier than that | goes on from the latest, in step with the caller's time |
 ///
 /// A backward step extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
@@ -155,7 +155,7 @@ impl MonotonicClock {
     }
 }
 
-/// Returns `to + (at - from)`: one clock shows `from`, the other `to`.
+/// Returns `to + (at - from)`.
 fn shifted(at: Instant, from: Instant, to: Instant) -> Instant {
     let back = from.since(at).as_micros();
     Instant::from_micros((to + at.since(from)).as_micros().saturating_sub(back))
@@ -187,8 +187,7 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` plus a random time of up to an eighth of it. Relays on a shared channel then do not collide again
-    /// and again.
+    /// Returns `span` plus up to an eighth, at random. Relays then do not transmit at once again and again.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.

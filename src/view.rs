@@ -9,7 +9,7 @@ use crate::mission::MAX_RELAYS;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
 
-/// Number of bits for the proposing node, enough for 1000 relays.
+/// Number of bits for the proposer: 1000 relays.
 const NODE: u32 = 10;
 
 impl ViewId {
@@ -36,12 +36,12 @@ impl ViewId {
         (self.0 & ((1 << NODE) - 1)) as u16
     }
 
-    /// Returns true for a valid proposer and not the initial view.
+    /// Returns true if a node can have proposed this view.
     pub(crate) const fn is_proposed(self) -> bool {
         self.number() > 0 && 1 <= self.proposer() && self.proposer() <= MAX_RELAYS
     }
 
-    /// Returns the next view, proposed by `node`, 1 to 1000. `None` after four million views.
+    /// Returns the next view by `node`; `None` after four million.
     pub(crate) const fn next_by(self, node: u16) -> Option<Self> {
         let number = self.number() + 1;
         if number >> (32 - NODE) == 0 {
@@ -51,8 +51,7 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, at most `most` above this view's number. A received view can then raise the known number only so
-    /// far.
+    /// Returns `view`, at most `most` above this number. It bounds the step by a received view.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -62,8 +61,7 @@ impl ViewId {
         }
     }
 
-    /// Returns a 16-bit value, added to the mission's digest in messages. It differs for different proposers, and over
-    /// thousands of consecutive views.
+    /// Returns a 16-bit value, added to the mission's digest. It differs by proposer, and over thousands of views.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -30,13 +30,13 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Value 1 of a sample I / `I_max` in fixed point: 2^31. Sums of samples and squares do not overflow.
+/// Value 1 of a sample in fixed point: sums do not overflow.
 const ONE: f32 = 2_147_483_648.0;
 
 /// Number of fractional bits of a sample.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of I / `I_max` for an estimate. Below it rounding would falsify the estimate.
+/// Smallest mean of the samples for an estimate; less is rounding.
 const LEAST_MEAN: f32 = 1e-6;
 
 /// Estimator of Upsilon, the mean inverse interference power, at one position.

@@ -18,7 +18,7 @@
 
 use super::{Field, FieldPoint};
 
-/// Interference field with receiver noise N, W: `Upsilon / (1 + N Upsilon)`. Upsilon is E[1/I].
+/// Field with receiver noise N, W: `Upsilon / (1 + N Upsilon)`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(
@@ -31,7 +31,7 @@ pub struct InNoise<'a> {
 }
 
 impl Field {
-    /// Returns this field with a receiver noise of `noise_w` watts, 0 to 1.
+    /// Returns this field with `noise_w` watts of noise, 0 to 1.
     pub(crate) const fn in_noise(&self, noise_w: f32) -> InNoise<'_> {
         InNoise {
             field: self,
@@ -41,7 +41,7 @@ impl Field {
 }
 
 impl InNoise<'_> {
-    /// Returns `upsilon / (1 + N upsilon)`, 1/W. It is finite: `upsilon` is at most 1e32, N at most 1.
+    /// Returns `upsilon / (1 + N upsilon)`, 1/W; always finite.
     const fn of(&self, upsilon: f32) -> f32 {
         if self.noise_w > 0.0 {
             upsilon / (1.0 + self.noise_w * upsilon)

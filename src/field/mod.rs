@@ -157,7 +157,7 @@ impl Field {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// Returns the two points around `x_m`. At a point, or beyond the ends, it is one and `None`.
+    /// Returns the points around `x_m`; one at a point or beyond.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {

@@ -17,10 +17,10 @@ pub(crate) mod tests;
 /// Maximum number of relays of a mission.
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x between two relays, divided by the distance Tx to Rx. It is at least two steps of an f32 near Rx.
+/// Smallest step in x, as a fraction of the Tx-Rx distance. It is at least two steps of an f32.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
-/// Maximum rounding error of a step in x, divided by the distance Tx to Rx.
+/// Maximum rounding error of a step, as a fraction of the Tx-Rx distance.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 /// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
@@ -80,7 +80,7 @@ pub struct MissionConfig {
 }
 
 impl MissionConfig {
-    /// Checks that the relays fit into the distance with their minimum separation.
+    /// Checks that the relays fit into the distance.
     pub(super) const fn room(&self) -> Result<(), MissionError> {
         if self.relays < 1 || self.relays > MAX_RELAYS {
             return Err(MissionError::Relays);
@@ -218,11 +218,11 @@ impl Interferer {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Interference {
-    /// One transmitter at a known position.
+    /// Transmitter at a known position.
     Source(Interferer),
     /// Distribution of the interference along x.
     Field(Field),
-    /// One transmitter at an unknown position.
+    /// Transmitter at an unknown position.
     ///
     /// Relays spread evenly until they know it ([`crate::Settings::listen`]).
     Unknown,
@@ -279,12 +279,12 @@ impl Band {
         !(self.least_m < self.most_m)
     }
 
-    /// Returns true for a valid range of altitudes: ordered, within 0.1 to 1e5 m.
+    /// Returns true for valid altitudes: ordered, 0.1 to 1e5 m.
     pub(super) const fn is_of_altitudes(self) -> bool {
         within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
     }
 
-    /// Returns true for a valid lateral range: ordered, within -1e5 to 1e5 m. It includes 0.
+    /// Returns true for a valid lateral range: ordered, with 0, -1e5 to 1e5 m.
     pub(super) const fn is_room_beside(self) -> bool {
         within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
     }
@@ -325,18 +325,17 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Factor of a drone-to-drone hop's SIR per watt of the sender. One interferer: eta / (`mu_los` `p_MSI`), 1/W.
-    /// Field: `Upsilon_max` / `mu_los`, m^2/W.
+    /// Factor of a drone-to-drone SIR per watt. One interferer: `eta / (mu_los p_MSI)`, 1/W. Field:
+    /// `Upsilon_max / mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Factor of the last hop's SIR per watt of its sender, m^2/W. One interferer: (`mu_nlos` / eta) ((X - D)^2 + Y^2)
-    /// / `p_MSI`. Field: Upsilon(D) / eta. Noise counts as interference at Rx.
+    /// Factor of the SIR at Rx per watt, m^2/W, with noise. One interferer:
+    /// `(mu_nlos / eta) ((X - D)^2 + Y^2) / p_MSI`. Field: `Upsilon(D) / eta`.
     pub(super) receiver_gain_per_w: f64,
-    /// Noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. 0 without noise and in a
-    /// field.
+    /// Noise divided by the interferer's power at 1 m: `nu = N eta / p_MSI`, 1/m^2. 0 without noise and in a field.
     pub(super) noise_at_a_metre: f32,
 }
 
-/// Maximum noise divided by the interferer's power received at 1 m. More would hide the interferer by f32 rounding.
+/// Maximum noise divided by the interferer's power at 1 m. Above it f32 rounding hides the interferer.
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
@@ -714,8 +713,7 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x between two neighbours, m. `across_squared` is their squared distance in y and
-    /// altitude, m^2.
+    /// Returns the minimum step in x between neighbours, m. `across_squared` is perpendicular to x, m^2.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -724,27 +722,22 @@ impl Mission {
         sqrt(apart * apart - across_squared)
     }
 
-    /// Returns the minimum step in x plus a margin for rounding, m. `across_squared` is the squared distance in y and
-    /// altitude, m^2.
+    /// Returns the minimum step in x plus a rounding margin, m. `across_squared` is perpendicular to x, m^2.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index` with room for later relays, m.
-    ///
-    /// Later relays compute their positions after this one. Farthest means toward Rx; in an interference field toward
-    /// Tx. `across_squared` is their largest squared distance in y and altitude, m^2.
+    /// Returns the farthest x with room for later relays, m. Farthest is toward Rx, in a field toward Tx.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index` without room for later relays, m. Farthest means toward Rx; in an
-    /// interference field toward Tx.
+    /// Returns the farthest x without room for later relays, m. Farthest is toward Rx, in a field toward Tx.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Returns the number of relays that compute their positions after `index`.
+    /// Returns the number of relays computed after `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -752,12 +745,12 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index` with room for later relays, m.
+    /// Returns the largest x with room for later relays, m.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index` if later relays share one x, m.
+    /// Returns the largest x if later relays share one x, m.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }
@@ -767,7 +760,7 @@ impl Mission {
         self.config.distance_m - after * self.step_of(least)
     }
 
-    /// Returns the step in x that is at least `least` after rounding, m.
+    /// Returns the step that is at least `least` after rounding, m.
     fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
         if least > 0.0 {
@@ -786,7 +779,7 @@ impl Mission {
     }
 }
 
-/// Factor on a gain that makes the first or last hop half as long. All hops of the best chain have equal SIR.
+/// Factor on a gain that halves the length of a hop. It holds because all hops of the best chain have equal SIR.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -802,8 +795,7 @@ impl Mission {
 
     /// Returns the mission with another `interference`.
     ///
-    /// `receiver_w` is the interference power at Rx, W; 0 to compute it. `halved` is true for a first or last hop half
-    /// as long as others.
+    /// `receiver_w` is that at Rx, W; 0 to compute it. `halved` makes the first or last hop half as long.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -834,7 +826,7 @@ impl Mission {
     }
 }
 
-/// Substitute for an unknown interferer, far away. All receivers have equal interference, to 1e-7.
+/// Far substitute for an unknown interferer: equal everywhere, to 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,
@@ -843,9 +835,8 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns gains for an unknown interferer: the best chain has equal hops. They are for the first hop, other hops and
-/// last hop. The latter two are per watt of the relays' power `power_w`. A hop of length d has the SIR `(distance_m /
-/// d)^2`.
+/// Returns gains of equal hops: first hop, others per watt, last per watt. A hop of length d has the SIR
+/// `(distance_m / d)^2`.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

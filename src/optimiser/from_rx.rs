@@ -35,14 +35,14 @@ use crate::sir::{Sender, square};
 
 /// Hop from Rx to the last relay.
 pub(super) struct FromRx {
-    /// Hop in a mirrored frame: x is the distance from Rx.
+    /// Mirrored hop: x is the distance from Rx.
     hop: Hop,
     reverse: f32,
     distance_m: f32,
 }
 
 impl FromRx {
-    /// Returns the hop from Rx to the last relay, `own`. `None` without data from Rx to Tx.
+    /// Returns the hop to the last relay, `own`. `None` without data from Rx to Tx.
     pub(super) fn new(mission: &Mission, own: Station) -> Option<Self> {
         let (reverse, distance_m) = (mission.reverse(), mission.config().distance_m);
         if !(reverse > 0.0) {
@@ -71,8 +71,7 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin `(SIR / required SIR - 1) D` at `x_m`, m. Below 0 if the hop misses `target`. Continuous in
-    /// `target`. D is the Tx-Rx distance.
+    /// Returns the margin `(SIR / required SIR - 1) D`, m. Below 0 if `target` is missed; continuous in `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -81,8 +80,8 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`] that receives Rx well enough, m. `None` if there is none. The SIR
-    /// must miss `target` at `x_m`.
+    /// Returns the largest x that receives Rx well enough, m. It is in [`least_m`, `x_m`]; `x_m` itself must miss
+    /// `target`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -97,8 +96,7 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay stays farther away if Rx is too weak. The relay starts at x = 650 m, with an
-    /// interferer at 700 m and Rx at 1000 m.
+    /// Checks that the last relay stays away from Rx if it is too weak.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -11,26 +11,25 @@ use crate::root::sqrt;
 /// Number of targets in a full ladder.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps in half a ladder, with the middle one.
+/// Number of gaps in half a ladder.
 const HALF: usize = TARGETS / 2;
 
-/// Ladder: rising target SIRs for one message along the chain. Encoded as one target and two one-byte codes.
+/// Ladder: rising target SIRs, encoded in six bytes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
     /// Eighth of 16 targets, linear SIR, or the only one.
     anchor: f32,
-    /// Code of the relative gap between the middle targets; 0 for one target. A float of 5 exponent and 3 mantissa
-    /// bits.
+    /// Code of the middle relative gap; 0 for one target. 5 exponent and 3 mantissa bits.
     gap: u8,
-    /// Code of the gaps' growth outward: each is `1 + growth / 16` times the last.
+    /// Code of the gaps' growth outward, `1 + growth / 16`.
     growth: u8,
-    /// True if every relay takes its farthest x. False if a relay may stay short to help the next one.
+    /// True if every relay takes its farthest x. False if relays may stay short.
     plain: bool,
 }
 
 impl Ladder {
-    /// Returns a ladder with the single SIR `target`, above 0. If the chain meets it, the last relay commits.
+    /// Returns a ladder with one target, above 0. The chain commits to it if met.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -40,17 +39,17 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets with another `plain`: relays take their farthest x.
+    /// Returns the same targets with another `plain`.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true if every relay takes its farthest x. Otherwise a relay may stay short to help the next one.
+    /// Returns true if every relay takes its farthest x.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
 
-    /// Returns 16 targets in equal ratios, just around `low` to `high`. 0 < `low` < `high`.
+    /// Returns 16 targets in equal ratios around `low` to `high`. 0 < `low` < `high`.
     pub fn spanning(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -59,7 +58,7 @@ impl Ladder {
         )
     }
 
-    /// Returns 16 targets in equal ratios, strictly between `low` and `high`. 0 < `low` < `high`.
+    /// Returns 16 targets in equal ratios between `low` and `high`. 0 < `low` < `high`.
     pub fn between(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -68,8 +67,8 @@ impl Ladder {
         )
     }
 
-    /// Returns 16 targets dense around `centre`, which span [`low`, `high`]. `centre` is inside a gap of relative width
-    /// `gap`; gaps grow outward.
+    /// Returns 16 targets dense around `centre`, which span [`low`, `high`]. `gap` is the relative gap there; gaps grow
+    /// outward.
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
@@ -99,7 +98,7 @@ impl Ladder {
         }
     }
 
-    /// Decodes a ladder; `None` if invalid. All targets must be normal f32 above zero. With `gap` 0, `growth` is 0.
+    /// Decodes a ladder; `None` if invalid. Targets are normal f32 above zero. With `gap` 0, `growth` is 0.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -120,7 +119,7 @@ impl Ladder {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true for a single target, which commits the chain if met.
+    /// Returns true for a single target.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }
@@ -164,7 +163,7 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the highest target divided by the lower middle one. `gap` and `growth` are codes.
+/// Returns the highest target divided by the lower middle one.
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -179,12 +178,12 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the relative gap `(1 + m / 8) 2^(e - 25)` of a code. m is its low three bits, e the others.
+/// Returns the relative gap `(1 + m / 8) 2^(e - 25)` of a code. m is its low three bits.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }
 
-/// Returns the code, 1 to 254, of the nearest relative gap.
+/// Returns the nearest code, 1 to 254.
 fn gap_code(gap: f32) -> u8 {
     let bits = gap.to_bits().saturating_sub(102 << 23);
     let rounded = bits.saturating_add(1 << 19) >> 20;

@@ -30,7 +30,7 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x per altitude.
 const HALVINGS: u8 = 20;
 
-/// Number of intervals of x on each side of the interferer. Used for data in both directions.
+/// Intervals of x on each side of the interferer, both directions.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -64,29 +64,29 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Two hops of a relay at any position: from the node toward Tx, and to the node toward Rx. SIRs of the first: `A q /
-/// l`, backward `returned / l`. SIRs of the second: `received / l`, backward `A' q / l`. l is the squared length, q the
-/// inverse interference at the relay. Backward SIRs are divided by r, the required backward to forward ratio.
+/// Two hops of a relay, with the nodes toward Tx and Rx. First hop: `A q / l`, backward `returned / l`. Second hop:
+/// `received / l`, backward `A' q / l`. l: squared length, q: inverse interference at the relay. Backward SIRs are
+/// divided by r.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the hop from the node toward Tx: SIR = `A q / l`.
+    /// Gain A from the node toward Tx: SIR = `A q / l`.
     gain: f32,
-    /// SIR at the node toward Rx, times the squared length, m^2.
+    /// SIR at the node toward Rx times squared length, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
-    /// Noise divided by the interferer's power received at 1 m, 1/m^2; 0 without noise.
+    /// Noise divided by the interferer's power at 1 m, 1/m^2.
     noise: f32,
 }
 
-/// Backward gains of both hops, divided by r; infinite without such data.
+/// Backward gains divided by r; infinite without such data.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// Backward SIR at the node toward Tx, times the squared length, m^2.
+    /// Backward SIR at the node toward Tx times squared length, m^2.
     returned: f32,
-    /// Gain A' from the node toward Rx back to the relay.
+    /// Gain A' from the node toward Rx.
     gain: f32,
 }
 
@@ -123,8 +123,7 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the two hops of a relay of `power_w` watts. `before` is the node toward Tx, `after` that toward Rx;
-    /// `None` for Tx or Rx.
+    /// Returns the two hops of a relay of `power_w` watts. `before` is `None` for Tx, `after` for Rx.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -160,8 +159,7 @@ impl Hops {
         }
     }
 
-    /// Returns the SIRs of both hops with the relay at `at`, linear. With traffic in both directions each is the lower
-    /// of forward SIR and backward SIR / r.
+    /// Returns the linear SIRs of both hops. Each is the lower of forward and backward / r.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -182,19 +180,19 @@ impl Hops {
         REVERSE && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the lower SIR of both hops: the paper's local SIR.
+    /// Returns the lower SIR: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
     }
 
-    /// Returns true if the hop from the relay is the worse one.
+    /// Returns true if the hop from the relay is worse.
     fn is_out_worse(&self, at: Placement) -> bool {
         let (incoming, outgoing) = self.both(at);
         incoming > outgoing
     }
 
-    /// Returns true if the minimum distances to both neighbours are kept.
+    /// Returns true if the minimum distances are kept.
     fn is_clear(&self, at: Placement) -> bool {
         let clear = |of: HopEnd| {
             square(at.x_m - of.place.x_m) + square(at.altitude_m - of.place.altitude_m)
@@ -220,7 +218,7 @@ pub struct LocalSearch {
     column: u8,
     /// Best altitude of the round, m, and its lower SIR.
     best_row: (f32, f32),
-    /// Best position so far; `None` if none beats the current one.
+    /// Best position; `None` if none beats the current one.
     found: Option<Placement>,
     /// Lower SIR of the best position so far, linear.
     best_sir: f32,
@@ -229,8 +227,7 @@ pub struct LocalSearch {
 }
 
 impl LocalSearch {
-    /// Starts the search for a relay at `at`. It tries `explore_m` metres up and down. `band` is the lowest and highest
-    /// allowed altitude, m.
+    /// Starts the search at `at`, `explore_m` up and down. `band` are the allowed altitudes, m.
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);
@@ -254,8 +251,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues by at most `budget` evaluations plus those of one altitude. One altitude takes 24, or 194 in both
-    /// directions. `Ready` with the best position if strictly better than the current one.
+    /// Continues by `budget` evaluations, at most one altitude more. One altitude: 24, in both directions 194. `Ready`
+    /// with a strictly better position.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let mut left = budget;
         while left > 0 {
@@ -271,7 +268,7 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Records `at` if it is allowed and best so far. Returns its lower SIR, or -1 if not allowed.
+    /// Records `at` if best; returns its lower SIR. -1 if not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
         self.record(at, self.hops.worse(at))
     }
@@ -288,13 +285,12 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude of the round, m: `part` 0 lowest, 1 highest. It never exceeds the highest, in spite of
-    /// rounding.
+    /// Returns an altitude, m: `part` 0 lowest, 1 highest. Never above, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the best x at the next altitude. Returns the number of evaluations; `None` after the last round.
+    /// Searches the next altitude; returns the evaluations, `None` at the end.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;
@@ -323,8 +319,7 @@ impl LocalSearch {
         })
     }
 
-    /// Searches the best x at `altitude_m`, where both SIRs are usually equal. Returns the lower SIR, or -1 if no x is
-    /// allowed.
+    /// Searches the best x at `altitude_m`; returns the lower SIR. -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
@@ -349,8 +344,8 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Returns the best lower SIR for x in `low` to `high`, both directions. Evenly spaced x are refined in halving
-    /// steps. Narrow maxima are where the SIRs are equal: bisection finds the first two.
+    /// Returns the best lower SIR for x in `low` to `high`. Narrow maxima have equal SIRs: bisection finds the first
+    /// two.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
@@ -398,7 +393,7 @@ impl LocalSearch {
         best
     }
 
-    /// Evaluates the next grid position; `None` after the last. Returns the number of evaluations, 1.
+    /// Evaluates the next grid position; `None` after the last.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;
@@ -426,8 +421,7 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns the search between two neighbours 100 m from each other. `altitude_m` is the relay's, `beside_m` the
-    /// neighbours' altitude. `apart_m` is the minimum separation, `band` the allowed altitudes, m.
+    /// Returns the search between two neighbours 100 m from each other. `beside_m` is their altitude.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

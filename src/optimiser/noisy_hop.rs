@@ -39,10 +39,10 @@ use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum target divided by gain: above it no hop is short enough. All numbers stay finite.
+/// Maximum target divided by gain; above it no hop is short enough.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
-/// Maximum number of Newton steps for a hop; usual are four to eight.
+/// Maximum number of Newton steps; usual are four to eight.
 const STEPS: u8 = 32;
 
 /// Maximum number of bisection steps.
@@ -51,7 +51,7 @@ pub(super) const HALVINGS: u8 = 32;
 /// Number of Newton steps for the change of curvature's sign.
 const TURNS: u8 = 5;
 
-/// Relative rounding error of the margin g. A target missed by no more counts as met.
+/// Relative rounding error of the margin g.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of length that ends the search.
@@ -64,33 +64,32 @@ pub(super) struct NoisyHop {
     pub(super) ratio: f32,
     /// Difference rho - 1, without cancellation.
     pub(super) excess: f32,
-    /// Distance u along x from the sender to the interferer, m.
+    /// Distance u along x from sender to interferer, m.
     pub(super) ahead: f32,
-    /// Squared distance a^2 from interferer to receiver perpendicular to x, m^2.
+    /// Squared distance a^2 from interferer to receiver, without x, m^2.
     pub(super) aside_squared: f32,
-    /// Squared distance b^2 from sender to receiver perpendicular to x, m^2.
+    /// Squared distance b^2 from sender to receiver, without x, m^2.
     pub(super) across_squared: f32,
     /// Difference `a^2 - b^2`, m^2, without cancellation.
     pub(super) base: f32,
-    /// Noise divided by the interferer's power received at 1 m, 1/m^2; above 0.
+    /// Noise divided by the interferer's power at 1 m, 1/m^2; above 0.
     pub(super) noise: f32,
 }
 
 impl NoisyHop {
-    /// Returns the longest hop along x by SNR alone, m, at most 1e9. `None` if no length meets the target.
+    /// Returns the longest hop by SNR alone, m, at most 1e9.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns true if a hop of `d` metres along x meets its target.
+    /// Returns true if `d` metres along x meet the target.
     pub(super) fn is_met(&self, d: f32) -> bool {
         let s = square(d - self.ahead) + self.aside_squared;
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the margin g at length `d`, half its derivative, and its rounding error. g, m^2, is at least 0 if the
-    /// target is met. `d`, m along x, must meet the target by SNR alone.
+    /// Returns the margin g at `d`, half its derivative, its rounding error. `d` must meet the target by SNR alone.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -111,7 +110,7 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer where g's curvature changes sign, m. `None` if g is concave everywhere.
+    /// Returns the distance where g's curvature changes sign, m. `None` if concave everywhere.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -125,8 +124,8 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// Returns the largest length in [`low`, `high`] that meets the target, m. `None` if there is none. `high` is at
-    /// most [`through_noise`](Self::through_noise). Work: at most 96 evaluations, usually five.
+    /// Returns the largest length in [`low`, `high`] that meets the target, m. `high` is at most
+    /// [`through_noise`](Self::through_noise). At most 96 evaluations, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -156,8 +155,7 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest length in [`low`, `high`] that meets the target, m. `None` if there is none. g must be
-    /// concave there, and below 0 at `high`.
+    /// Returns the largest length that meets the target, m. g must be concave in [`low`, `high`], below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -180,8 +178,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest length in [`low`, `high`] that meets the target, m. g must be convex there, at least 0 at
-    /// `low`, below 0 at `high`.
+    /// Returns the largest length that meets the target, m. g must be convex in [`low`, `high`], at least 0, then
+    /// below.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {
@@ -206,7 +204,7 @@ impl NoisyHop {
     }
 }
 
-/// Returns `x_m - d`, m, rounded down: at least `d` below `x_m`.
+/// Returns `x_m - d`, m, rounded down.
 pub(super) fn before(x_m: f32, d: f32) -> f32 {
     let place = x_m - d;
     if x_m - place < d {
@@ -216,8 +214,7 @@ pub(super) fn before(x_m: f32, d: f32) -> f32 {
     }
 }
 
-/// Returns the shortest length in [`least`, `most`] that meets the target, m. `None` if there is none. The target must
-/// be missed at `least`.
+/// Returns the shortest length that meets the target, m. `least` must miss it.
 pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     if !(hop.ratio <= MOST_RATIO) {
         return None;
@@ -234,7 +231,7 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the length above which a noise-free hop meets the target, m. `None` if there is none; it can be negative.
+/// Returns the length above which a noise-free hop meets the target, m. It can be negative.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -257,7 +254,7 @@ mod tests {
     use super::{NoisyHop, closest};
     use crate::features::NOISE;
 
-    /// Returns the shortest length that meets the target, in fine steps. Reference for [`closest`].
+    /// Returns [`closest`] by fine steps.
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;
         (0..=20_000_u16)

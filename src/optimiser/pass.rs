@@ -28,10 +28,10 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of last-relay positions tried for reception of Rx. Used only with data in both directions.
+/// Maximum number of tried positions of the last relay.
 const HOLDS: u8 = 4;
 
-/// Maximum number of field points per call. A target once begun is completed.
+/// Maximum field points per call; a target is completed.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Relay whose message arrives now: the previous one.
@@ -40,13 +40,12 @@ const POINTS_AT_ONCE: usize = 128;
 pub struct Behind {
     /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
-    /// Upsilon (mean inverse interference) of the previous relay, 1/W, if measured. `None` for the mission's field.
-    /// Used only toward Tx.
+    /// Upsilon (mean inverse interference), 1/W, if measured. Used only toward Tx.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a previous relay with lateral offset 0 and no measurement.
+    /// Returns a previous relay at y = 0 without measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -55,24 +54,24 @@ impl Behind {
     }
 }
 
-/// Relay with all data for its farthest x at a target.
+/// Relay with all data for its farthest x.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
     pub mission: &'a Mission,
-    /// Previous relay; `None` for the relay next to Tx or Rx.
+    /// Previous relay; `None` if it is Tx or Rx.
     pub behind: Option<Behind>,
-    /// Index in the chain: 1 next to Tx, N next to Rx.
+    /// Index: 1 next to Tx, N next to Rx.
     pub index: u16,
     /// Lateral offset, altitude and power of this relay.
     pub own: Station,
-    /// Upsilon (mean inverse interference) of this relay, 1/W, if measured. `None` for the mission's field.
+    /// Upsilon (mean inverse interference) here, 1/W, if measured.
     pub measured_per_w: Option<f32>,
-    /// True if every relay takes its farthest x. False if a relay may stay short to help the next one.
+    /// True if every relay takes its farthest x. False if relays may stay short.
     pub plain: bool,
-    /// Maximum x with room for the relays toward Rx, m. `None` except in the joint method. Not used in a field.
+    /// Maximum x with room for later relays, m. Only in the joint method.
     pub end_m: Option<f32>,
-    /// Fixed x of this relay, m, if its hop meets the target there. `None` without fitted time slots.
+    /// Fixed x, m; `None` without fitted time slots.
     pub fixed_m: Option<f32>,
 }
 
@@ -81,7 +80,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the x of the first sender, m: Tx, or Rx in a field.
+/// Returns the first sender's x, m: Tx, in a field Rx.
 pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -90,9 +89,8 @@ pub fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends this relay's reach for each target not in `reaches` yet. `targets` ascend; entry i of each list is for
-    /// target i. `from` has the previous relay's reaches, m. The list ends before the first missed target. Work per
-    /// target: one hop; in a field up to three per field point.
+    /// Appends this relay's reach for each target not in `reaches` yet. Targets ascend. The list ends before the first
+    /// missed target.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -135,8 +133,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Continues [`extend`](Self::extend) by bounded work; true at the end. One call: 16 reaches; in a field 128 point
-    /// evaluations, at least one reach.
+    /// Continues [`extend`](Self::extend); true at the end. One call: 16 reaches; in a field 128 points, at least one
+    /// reach.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -151,8 +149,7 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from `from_m` to `x_m` meets `target`. Both directions must; relays must be in order and
-    /// separated.
+    /// Returns true if the hop meets `target`. Both directions must, in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -214,14 +211,12 @@ impl<'a> Link<'a> {
         }))
     }
 
-    /// Returns the maximum x of the previous relay toward Tx, m. Relays nearer to Rx need no separation in x: altitudes
-    /// can differ.
+    /// Returns the previous relay's maximum x toward Tx, m.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop with the smallest x of this relay, its sender. The receiver is at `low` to `high`, m; if
-    /// `plain`, at `low`. `None` if none meets `target`.
+    /// Returns the hop with the smallest x of this relay, its sender. If `plain`, the receiver is at `low`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -242,9 +237,7 @@ impl<'a> Link<'a> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the slack for `target`, and this last relay's x, m. `reach` is this relay's, `from_m` the previous
-    /// one's. Toward Rx: `reach` plus the last hop's maximum length, minus D. Toward Tx: the first hop's maximum length
-    /// minus the x, best chosen. `None` if Rx is out of reach from everywhere.
+    /// Returns the slack for `target`, and this last relay's x, m. `None` if Rx is out of reach from everywhere.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -293,8 +286,7 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m` that receives the previous relay, m. That relay may be anywhere up to
-    /// `from_m`. `None` if there is none.
+    /// Returns the largest x that receives the previous relay, m. That relay is anywhere up to `from_m`.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -302,8 +294,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the slack and this last relay's x, m, for both directions. `hop` leads from Rx to here; `slack` is that
-    /// toward Rx for an x. The relay stays short of `reach` if Rx would be too weak there.
+    /// Returns the slack and this last relay's x, m, both directions. It stays short of `reach` if Rx would be too
+    /// weak.
     fn held(
         &self,
         hop: &FromRx,
@@ -334,9 +326,7 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the previous relay must take, if this one is at `place`. `from_m` is the reach before the
-    /// previous relay. `None` if there is no such x. Possible positions are assumed to be one interval without gaps.
-    /// Work: at most two reaches; in a field three per field point.
+    /// Returns the x that the previous relay must take, if any. Possible x are assumed to be one interval.
     pub fn required_position(
         &self,
         target: f32,
@@ -399,8 +389,7 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the last relay's result for all targets. `reaches` are those of `link`, `from` those of the previous relay,
-/// m.
+/// Returns the last relay's result for all targets.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -412,18 +401,18 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result for a list of targets: slacks, and the committed target.
+/// Result for all targets: slacks, and the committed target.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the committed target; `None` while the search goes on.
+    /// Index of the committed target, if any.
     pub commit: Option<u8>,
-    /// Slack for each target that every hop can meet, m. 0 or more if the chain meets it.
+    /// Slack per target, m; 0 or more if met.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
-    /// Returns the result for the targets of `ladder`; `slacks` are in m. The highest met target is committed in two
-    /// cases. The next one is missed and within the tolerance, or the ladder has one target.
+    /// Returns the result for `ladder`; `slacks` in m. The highest met target is committed if the next is within
+    /// tolerance, or if single.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -450,8 +439,7 @@ impl Verdict {
     }
 }
 
-/// Returns the number of targets up to the highest met; 0 if none. Met means a slack of 0 or more. Lower missed targets
-/// count as met.
+/// Returns the number of targets up to the highest met. Lower missed targets count.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -497,7 +485,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns index, previous reach and own reach of each relay, m. The list ends at a hop that misses the target.
+    /// Returns index, previous reach and own reach, m, per relay. It ends at a missed target.
     pub fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
         let mut reach = origin(self.mission);
         let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
@@ -508,7 +496,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if all can take theirs. `None` otherwise. Index 0 only checks.
+    /// Returns relay `index`'s reach, m, if all can take theirs. Index 0 only checks.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -527,7 +515,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         None
     }
 
-    /// Returns the reach of relay `index`, m; for `None` the first sender's x. `None` if a hop cannot meet the target.
+    /// Returns relay `index`'s reach, m; for `None` the first sender's x.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let Some(index) = index else {
             return Some(origin(self.mission));
@@ -536,8 +524,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m, if all required positions are possible. `None` otherwise. Index 0 only
-    /// checks.
+    /// Returns relay `index`'s x, m, if all x are possible. Index 0 only checks.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -559,9 +546,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes all positions, from the last relay, at `place` m, to the first. `visit` gets a relay's index, its x,
-    /// and the previous relay's index. It returns that relay's reach, m; for `None` the first sender's x. Returns the x
-    /// before the first relay. `None` if a required position is impossible, or `visit` returns `None`.
+    /// Computes all positions from the last relay, at `place`, to the first. `visit` returns the reach of the previous
+    /// relay, m.
     pub fn settle(
         &self,
         place: f32,

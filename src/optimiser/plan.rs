@@ -10,7 +10,7 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target SIR that the chain has agreed on, and its ladder.
+/// Agreed target SIR, and its ladder.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
@@ -20,19 +20,18 @@ pub struct Agreed {
     pub commit: u8,
     /// Agreed target SIR, linear.
     pub target: f32,
-    /// Target SIR that no chain at these altitudes meets, linear. `None` with the paper's fixed step, and for data in
-    /// both directions.
+    /// Target SIR that no chain here meets, linear. `None` with the paper's step or both directions.
     pub most: Option<f32>,
     /// Number of ladders tried.
     pub sweeps: u32,
 }
 
-/// Solver for a whole chain without messages, a few hops per call. Its size does not depend on the number of relays.
+/// Solver of a whole chain without messages. Its size does not depend on the number of relays.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
     reaches: PerTarget,
-    /// Farthest x of the current relay for each target so far, m.
+    /// Farthest x of the current relay per target, m.
     next: PerTarget,
     index: u16,
     behind: Option<Behind>,
@@ -65,13 +64,10 @@ impl Planner {
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
-    /// Computes at most `hops` hops; `Ok(Some(..))` once solved.
-    ///
-    /// A hop is one relay's farthest x for up to 16 targets. In a field a call evaluates 128 points, at least one x.
-    /// `profile_of` returns the profile of relay 1..=N, always the same.
+    /// Computes at most `hops` hops; `Ok(Some(..))` once solved. `profile_of` must always return the same.
     ///
     /// # Errors
-    /// [`Infeasible`] if no target is left to try.
+    /// [`Infeasible`] if no target is left.
     #[inline(never)] // frees its stack before a sweep starts
     pub fn step(
         &mut self,
@@ -121,10 +117,7 @@ impl Planner {
     }
 }
 
-/// Solves the chain in one call.
-///
-/// At most about fifty ladders over N hops with the bracketed schedule. Positions are checked if relays have to stay
-/// short.
+/// Solves the chain in one call: at most some fifty ladders.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -161,9 +154,8 @@ pub fn solve(
 }
 
 impl Mission {
-    /// Returns relay `index`'s position without messages. All relays must have the mission's profile. `None` if no
-    /// target can be met. To the bit the position agreed by messages: `silent_places_equal_those_by_messages` in
-    /// `host-tests/tests/chain.rs`.
+    /// Returns relay `index`'s position without messages, if any. It equals the agreed one to the bit. All relays must
+    /// have the mission's profile.
     pub fn silent_place(&self, index: u16) -> Option<Placement> {
         let common = |_| self.config().common;
         let agreed = solve(self, Schedule::Bracketed, common).ok()?;

@@ -64,11 +64,10 @@ const ROUNDING: f32 = 4e-6;
 /// Maximum number of f32 steps that shorten a hop.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in a field: the receiver is known, the sender searched.
+/// Hop toward Rx in a field, from a searched sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A, m^2: SIR = `A quiet / squared length`. `quiet` is Upsilon = E[1/I] at the receiver, divided by the
-    /// field's largest. For the hop to Rx, A includes Upsilon, and `quiet` is 1.
+    /// Gain A, m^2: SIR = `A quiet / squared length`. `quiet` is Upsilon divided by the largest; to Rx it is in A.
     gain: f32,
     /// Squared altitude difference of the hop, m^2.
     climb_squared: f32,
@@ -76,13 +75,12 @@ pub struct Retreat<'a> {
     /// Smallest permitted x of the sender, m.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop: gain / r, and the interference at its receiver. `None` for data in one direction. The gain is for
-    /// the field's largest Upsilon. r is the required backward to forward SIR.
+    /// Backward gain / r, and the interference at its receiver, if any.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
 impl<'a> Retreat<'a> {
-    /// Returns the hop from relay `index` to one at `altitude_m`; `None` for Rx. `own` is relay `index`.
+    /// Returns the hop to a relay at `altitude_m`; `None` for Rx.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb_squared = square(own.cross_section.altitude_m - altitude_m.unwrap_or(0.0));
         let (gain, least_step) = match altitude_m {
@@ -103,8 +101,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Adds the backward hop, if the mission has data from Rx to Tx. Its sender has `power_w` watts; `None` for Rx. Its
-    /// receiver has measured Upsilon = `measured_per_w`, 1/W.
+    /// Adds the backward hop, if the mission has one. Its sender has `power_w` watts, or is Rx. `measured_per_w` is
+    /// Upsilon at its receiver, 1/W.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,
@@ -129,7 +127,7 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with a sender at any x down to Tx. Relays closer to Tx then need no separation in x.
+    /// Returns this hop with any sender x down to Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -147,9 +145,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x from which the sender meets `target`, m. It is in [end, `from_m`]; `None` if there is
-    /// none. `target` is linear, above 0; `from_m`, from 0 to D, is the receiver. `quiet`, above 0: Upsilon at the
-    /// receiver divided by the largest; 1 at Rx. Rounded toward the receiver. Constant work.
+    /// Returns the smallest x that meets `target`, in [end, `from_m`], m. `quiet` is Upsilon divided by the largest.
+    /// Rounded toward the receiver.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let place = self.onward(target, from_m, quiet)?;
         match self.back() {
@@ -158,9 +155,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x that receives the backward hop, m. It is in [`place`, `most_m`); `None` if there is none.
-    /// The backward sender is at `from_m`. `c` is the gain for the largest Upsilon, divided by the target. Work: one
-    /// root per field point from `place` to `from_m`.
+    /// Returns the smallest x in [`place`, `most_m`) that receives the backward hop, m. Work: one root per field point.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(
         &self,
@@ -213,8 +208,7 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest receiver x with a backward hop to `place`, m. Infinite for one direction, -infinite if no x
-    /// meets `target`.
+    /// Returns the largest receiver x with a backward hop, m. Infinite for one direction, -infinite if none.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;
@@ -255,8 +249,7 @@ impl<'a> Retreat<'a> {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop with the smallest x of its sender. The receiver is at `low` to `high`, m. `None` if none meets
-    /// `target`.
+    /// Returns the hop with the smallest x of its sender. The receiver is in [`low`, `high`], m.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -317,8 +310,8 @@ impl<'a> Retreat<'a> {
         best
     }
 
-    /// Returns the smallest x of a sender to `y_m`, m. `quiet` is Upsilon there, divided by the largest. `best_m` adds
-    /// the backward hop: a lower result replaces it.
+    /// Returns the smallest sender x for a receiver at `y_m`, m. `best_m` adds the backward hop; a lower result
+    /// replaces it.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -330,7 +323,7 @@ impl<'a> Retreat<'a> {
         Some(from_m)
     }
 
-    /// Returns the hop with the smallest sender x, searched by [`least`].
+    /// Returns the hop that [`least`] finds.
     #[inline(never)] // one copy for data in one and in both directions
     fn searched(
         &self,
@@ -347,8 +340,8 @@ impl<'a> Retreat<'a> {
         least(interference, self.gain / target, squares, low, high, value)
     }
 
-    /// Returns the receiver x that just meet the target both ways, m. The sender is in the field's part `from`, the
-    /// receiver in `to`. `gains` are forward and backward, divided by the target.
+    /// Returns the receiver x that just meet both directions, m. Sender in `from`, receiver in `to`. `gains` are
+    /// divided by the target.
     fn equal_limits(&self, gains: [f32; 2], from: Piece, to: Piece) -> [Option<f32>; 2] {
         let [c, back] = gains;
         let (rise, back_rise) = (c * to.slope, back * from.slope);
@@ -401,7 +394,7 @@ pub enum HopInterference<'a> {
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the measurement if there is one, else the field. `measured_per_w` is Upsilon, 1/W. Both include noise.
+    /// Returns the measurement, or else the field. `measured_per_w` is Upsilon, 1/W, with noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -418,7 +411,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the field from `start_m` to its next point or `end_m`.
+    /// Returns the field from `start_m` to the next point.
     #[inline(never)] // one copy for all loops
     fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {
@@ -442,7 +435,7 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Part of the field in which Upsilon = E[1/I] is linear.
+/// Part of the field with a linear Upsilon.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Piece {
     start_m: f32,
@@ -453,10 +446,8 @@ struct Piece {
     slope: f32,
 }
 
-/// Returns the hop with the smallest sender x, for receivers in [`low`, `high`], m. Of equally good ones the smallest
-/// receiver x. `value` returns the sender's x for receiver y and `quiet`: `y - sqrt(c quiet - s)`. `quiet` is Upsilon
-/// at y divided by the largest, `c` the gain divided by the target. s is the first of `squares`. `value` is `None` if
-/// the root's square is below second minus first. Work: three values per reachable field point.
+/// Returns the hop with the smallest sender x, then receiver x. `value` is `y - sqrt(c quiet - s)` with
+/// `s = squares[0]`, for receiver y. Three values per reachable field point.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

@@ -50,14 +50,13 @@ use crate::place::CrossSection;
 use crate::root::sqrt;
 use crate::sir::{in_noise, square, transmitter_gain};
 
-/// Limit of a hop's squared length, m^2: all numbers stay finite.
+/// Limit of a squared length, m^2: numbers stay finite.
 const MOST_SQUARED: f32 = 1e18;
 
 /// Backward hop, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Backward gain / r: SIR / r = gain times inverse interference / squared length. r is the required backward to
-    /// forward SIR. At Tx the gain, m^2, includes the interference.
+    /// Backward gain / r: times inverse interference / squared length. At Tx, m^2, it includes the interference.
     gain: f32,
     /// True if Tx is the receiver.
     to_tx: bool,
@@ -65,12 +64,12 @@ pub struct Back {
     interferer_x_m: f32,
     /// Squared distance receiver to interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Noise divided by the interferer's power received at 1 m, 1/m^2.
+    /// Noise divided by the interferer's power at 1 m, 1/m^2.
     noise: f32,
 }
 
 impl Back {
-    /// Returns the backward hop from a relay of `power_w` watts to `to` or Tx. `None` without data from Rx to Tx.
+    /// Returns the backward hop to `to` or Tx, if any.
     #[inline(never)] // keeps a sweep without a way back small
     pub(super) fn new(
         mission: &Mission,
@@ -97,7 +96,7 @@ impl Back {
         })
     }
 
-    /// Returns the squared maximum length times the forward target, m^2. The receiver is at `x_m`.
+    /// Returns the squared maximum length times the target, m^2.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -106,15 +105,13 @@ impl Back {
         self.gain * in_noise(squared, self.noise)
     }
 
-    /// Returns the maximum length along x for a receiver at `x_m`, m. `across_squared` is the ends' squared distance
-    /// perpendicular to x, m^2. `None` if no length meets the target.
+    /// Returns the maximum length along x, m, if any. `across_squared` is perpendicular to x, m^2.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns the backward hop from `x_m` as a function of its length. `across_squared` is the ends' squared distance
-    /// perpendicular to x, m^2.
+    /// Returns the backward hop as a function of its length. `across_squared` is perpendicular to x, m^2.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -128,16 +125,15 @@ impl Back {
         }
     }
 
-    /// Returns the distance in x from the interferer below which `target` is missed, m. `squared` is the hop's squared
-    /// length, m^2. `None` if it is missed everywhere.
+    /// Returns the distance from the interferer that misses `target`, m. `squared` is the hop's, m^2. `None` if missed
+    /// everywhere.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }
 }
 
-/// Returns the distance in x from the interferer below which q < `needed`, m. `q = s / (1 + noise s)`, with the squared
-/// distance s from the interferer. `aside_squared` is its part perpendicular to x, m^2. `None` if q < `needed`
-/// everywhere.
+/// Returns the distance from the interferer with q < `needed`, m. `q = s / (1 + noise s)`, s the squared distance.
+/// `aside_squared` is perpendicular to x. `None` if everywhere.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

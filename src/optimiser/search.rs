@@ -34,7 +34,7 @@ pub enum Schedule {
     /// The search ends once the optimum is known to the mission's tolerance.
     #[default]
     Bracketed,
-    /// One target at a time, falling in equal steps, as in the paper.
+    /// Single targets, falling in equal steps, as in the paper.
     ///
     /// The first target is the upper bound.
     FixedStep {
@@ -63,11 +63,10 @@ const HIGHEST: f32 = 1e30;
 /// Lowest tried target, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation, in gaps between targets. Above it the cubic result is not
-/// used.
+/// Maximum difference of cubic and linear interpolation, in gaps.
 const BEND: f32 = 0.25;
 
-/// Maximum bracket width after / before for interpolated targets. Above it the next targets are spread evenly.
+/// Maximum bracket width after / before for interpolated targets.
 const PROGRESS: f32 = 0.25;
 
 /// Number of ladders after which the search ends.
@@ -78,32 +77,30 @@ const MOST_SWEEPS: u32 = 48;
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound of the SIR, linear: the leader's hop to Tx or Rx.
+    /// Upper bound of the SIR, linear.
     ceiling: f32,
-    /// First target, gamma_0 of the paper; upper bound of the bracket.
+    /// First target, gamma_0 of the paper.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the last bracket: `infeasible / feasible - 1`.
+    /// Relative width of the last bracket.
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True if relays take their farthest x. Always so in the paper's schedule, and after a relay has refused a target.
+    /// True if relays take their farthest x. Always in the paper's schedule, and after a refusal.
     plain: bool,
     /// Lowest target that no chain meets; `None` if unknown.
     most: Option<f32>,
-    /// Bisection for a target that all relays accept. `None` before the first refusal.
+    /// Bisection for a target that all relays accept, after a refusal.
     trials: Option<StandTrials>,
     both_ways: bool,
 }
 
 impl Search {
-    /// Creates the search of `mission`'s leader, which has the profile `leader`.
-    ///
-    /// Other relays can have other profiles.
+    /// Creates the search; the leader of `mission` has the profile `leader`.
     ///
     /// # Errors
-    /// [`Infeasible`] if the SIR right above Rx is 0: the interferer is at Rx.
+    /// [`Infeasible`] if the interferer is at Rx.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {
             distance_m, common, ..
@@ -160,15 +157,14 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next targets by `ladder`, expected to end the search. If it is plain, all later ladders are.
+    /// Replaces the next targets by `ladder`. If it is plain, all later ones are.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target that no chain meets; `None` if unknown.
-    ///
-    /// `slacks` are those of the last ladder, m. `None` for data in both directions. Plain ladders prove nothing.
+    /// Returns the lowest target that no chain meets, if known. `None` for data in both directions and after plain
+    /// ladders.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if REVERSE && self.both_ways {
             // For data in both directions it is not proven that reaches and held positions exclude no chain.
@@ -182,13 +178,12 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues with `slacks`, m, of the first targets of [`Search::ladder`].
+    /// Continues with the slacks, m, of [`Search::ladder`]'s first targets.
     ///
-    /// There is one slack for each target that every hop can meet. Work: at most some 200 floating-point operations and
-    /// three logarithms.
+    /// Some 200 floating-point operations and three logarithms.
     ///
     /// # Errors
-    /// [`Infeasible`] if no target is left to try.
+    /// [`Infeasible`] if no target is left.
     pub fn advance(&mut self, slacks: &[f32]) -> Result<(), Infeasible> {
         self.tried = self.tried.saturating_add(1);
         if let Some(trials) = &mut self.trials
@@ -280,8 +275,7 @@ impl Search {
     }
 }
 
-/// Lowers `start` and `met` for data from Rx to Tx; returns both. `start`, the upper bound, also respects the backward
-/// hop to Tx. `met`, a feasible target, also both backward end hops.
+/// Lowers `start` and `met` for data from Rx to Tx. `start` respects the hop to Tx, `met` also that from Rx.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -302,8 +296,8 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target with slack 0, by cubic interpolation of ln(target). The curve runs through the four points next
-/// to the change of sign. `None` if a straight line differs much: the slack jumps.
+/// Returns the target with slack 0, by cubic interpolation of ln(target). `None` if a straight line differs much: the
+/// slack jumps.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -323,7 +317,7 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Returns the value at 0 of the polynomial through `points`. `None` unless the x strictly fall.
+/// Returns the polynomial's value at 0; `points` must fall in x.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {
@@ -338,19 +332,18 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     points.first().map(|point| point.1)
 }
 
-/// Bisection for the highest target that all relays accept. A relay refuses if its required position is impossible.
+/// Bisection for the highest target that all relays accept.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
     /// Highest accepted target and its ladder; `None` before the first.
     best: Option<(f32, Ladder)>,
-    /// True at the end; the best target is then the result.
+    /// True at the end.
     over: bool,
 }
 
 impl Search {
-    /// Returns the target that a relay refused, from `verdict`'s slacks. `None` if none was. A relay refuses by
-    /// deleting the commit from `verdict`.
+    /// Returns the refused target, if any. A relay refuses by deleting the commit from `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
@@ -373,10 +366,7 @@ impl Search {
         last || self.try_next().is_err() || self.trials.is_some_and(|trials| trials.over)
     }
 
-    /// Continues after a relay refused `target`.
-    ///
-    /// First the relays take their farthest x: no relay can refuse. Then the interval up to the refused target is
-    /// bisected. `most` is a target that no chain meets, if known.
+    /// Continues after a relay refused `target`. All relays take their farthest x first: none can refuse.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.
@@ -406,7 +396,7 @@ impl Search {
         Ok(())
     }
 
-    /// Selects the bisection's next target; at the end the best accepted one.
+    /// Selects the next target; at the end the best accepted one.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

@@ -51,9 +51,9 @@ use crate::sir::{Sender, in_noise, square};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// The previous node takes its farthest x. Also for Tx and Rx, which cannot move.
+    /// The previous node takes its farthest x, or cannot move.
     AtReach,
-    /// The previous relay takes this x, m, short of its farthest.
+    /// The previous relay takes this x, m, and stays short.
     At(f32),
 }
 
@@ -67,7 +67,7 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared for many targets. A maximum length takes three divisions and a square root.
+/// Hop toward Rx, prepared for many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -75,28 +75,27 @@ pub struct Hop {
     interferer_x_m: f32,
     /// Squared distance receiver to interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Difference a^2 - b^2 of squared distances perpendicular to x, m^2. a: receiver to interferer, b: receiver to
-    /// sender. Without cancellation `(Y - y0) (Y + y0 - 2y) + h0 (2h - h0)`. The interferer is at Y, the sender at y0
-    /// and h0, the receiver at y and h.
+    /// Difference a^2 - b^2 of squared distances without x, m^2. `(Y - y0) (Y + y0 - 2y) + h0 (2h - h0)`: no
+    /// cancellation.
     base: f32,
     /// Squared distance receiver to sender perpendicular to x, m^2.
     across_squared: f32,
-    /// Noise divided by the interferer's power received at 1 m, 1/m^2; 0 without noise.
+    /// Noise divided by the interferer's power at 1 m, 1/m^2.
     noise: f32,
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer.
     from_tx: bool,
     /// Largest permitted x of the receiver, m.
     end_m: f32,
-    /// Maximum x of receiver and sender, m. They leave room for the relays nearer to Rx.
+    /// Maximum x of receiver and sender, m.
     gathered_m: [f32; 2],
     /// Backward hop; `None` without data from Rx to Tx.
     back: Option<Back>,
 }
 
 impl Hop {
-    /// Creates the hop from `sender` to relay `index` at `at`. `spread_squared` is the later neighbours' largest
-    /// squared distance perpendicular to x, m^2.
+    /// Creates the hop to relay `index` at `at`. `spread_squared` is later neighbours' largest squared distance without
+    /// x, m^2.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -122,8 +121,8 @@ impl Hop {
         }
     }
 
-    /// Creates the hop to a receiver at `at` with x up to `end_m`. It has no minimum length. `noise` is divided by the
-    /// interferer's power at 1 m, 1/m^2.
+    /// Creates the hop to `at` with x up to `end_m`. It has no minimum length. `noise`: divided by the interferer's
+    /// power at 1 m, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -153,8 +152,7 @@ impl Hop {
         if REVERSE { self.back.as_ref() } else { None }
     }
 
-    /// Adds the backward hop, if the mission has data from Rx to Tx. `power_w` is the receiver's power, W: it sends
-    /// back.
+    /// Adds the backward hop, sent with `power_w` watts, if any.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {
@@ -163,7 +161,7 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a receiver at any x up to Rx. Relays nearer to Rx then need no separation in x.
+    /// Returns this hop with any receiver x up to Rx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -175,9 +173,8 @@ impl Hop {
         Self { end_m, ..self }
     }
 
-    /// Returns the largest x in [`from_m`, end] that meets `target`, m. `None` if there is none. `target` is linear,
-    /// above 0; `from_m`, 0 to D, is the sender's x. Rounded toward the sender, so an f32 meets it. Work: constant;
-    /// with noise at most 96 evaluations, usually five.
+    /// Returns the largest x in [`from_m`, end] that meets `target`, m. Rounded toward the sender. At most 96
+    /// evaluations, without noise one.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_simple() {
             self.in_silence(target, from_m)
@@ -196,7 +193,7 @@ impl Hop {
         self.ending(place).onward(target, from_m)
     }
 
-    /// Returns the largest x that meets `target` toward Rx only, m. The sender is at `from_m`. `None` if there is none.
+    /// Returns the largest x that meets `target` toward Rx, m.
     fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -248,9 +245,7 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x that meets `target` with any sender in [0, `from_m`], m. It is [`Hop::reach`] if at least
-    /// a minimum step beyond `from_m`. Otherwise the sender is a minimum step before it. `None` if there is none.
-    /// Constant work.
+    /// Returns the largest x that meets `target` with any sender up to `from_m`, m.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self
             .reach(target, from_m)
@@ -261,8 +256,8 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x that meets `target` both ways, m. The sender is in [0, `from_m`]; `place` is the result
-    /// from `from_m`. It is larger if a smaller sender x receives `back` better.
+    /// Returns the largest x that meets `target` both ways, m. `place` is that from `from_m`; a smaller sender x can be
+    /// better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -282,8 +277,7 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x up to `near` for both directions, m. `None` if there is none. The receiver is at
-    /// `place`.
+    /// Returns the sender's largest x up to `near`, both directions, m.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -333,7 +327,7 @@ impl Hop {
         (self.before(place) >= 0.0).then_some(place)
     }
 
-    /// Returns the largest sender x separated from a receiver at `place`, m.
+    /// Returns the largest separated sender x, m.
     fn before(&self, place: f32) -> f32 {
         let from = place - self.least_step;
         if place - from < self.least_step || from >= place {
@@ -343,8 +337,7 @@ impl Hop {
         }
     }
 
-    /// Returns the required sender position for a receiver at `place`. `from_m` is the sender's farthest x. The closest
-    /// permitted position has the best SIR. `None` if none is permitted.
+    /// Returns the required sender position, if permitted. The closest one has the best SIR.
     pub fn required_position(
         &self,
         target: f32,
@@ -389,9 +382,7 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x that meets `target`, m, without a minimum step. So it is smooth, as the joint method
-    /// requires. `None` if there is none. It is below `from_m`, the sender's x, if the distance perpendicular to x is
-    /// too long.
+    /// Returns the largest x that meets `target`, m, without a minimum step. It is smooth, and can be below `from_m`.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -445,7 +436,7 @@ impl Hop {
 /// Relative rounding tolerance of a hop's SIR.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns `from_m + d`, m, rounded toward `from_m`. `None` if equal: two relays must not have the same x.
+/// Returns `from_m + d`, m, rounded down. `None` if equal: x must differ.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -461,9 +452,8 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the paper's `d_max`, m: the farthest relay along x that meets `target` at Rx. It is `sqrt(K / gamma - y^2 -
-/// h^2)`, at most 1e9; K is the last hop's factor. `None` if even a relay right above Rx is too weak. It can exceed the
-/// Tx-Rx distance: so it is smooth for the root search.
+/// Returns the paper's `d_max`, `sqrt(K / gamma - y^2 - h^2)`, m, at most 1e9. `None` if always too weak. It can exceed
+/// the Tx-Rx distance: smooth for the root search.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
@@ -480,13 +470,12 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns the noise divided by the interferer's power at 1 m, 1/m^2. Constant 0 without the feature `noise`: the
-    /// search in noise is dropped.
+    /// Returns the noise divided by the interferer's power at 1 m, 1/m^2. Constant without the feature `noise`.
     fn nu(&self) -> f32 {
         if NOISE { self.noise } else { 0.0 }
     }
 
-    /// Returns [`Hop::reach`] with noise, m. `None` if no x meets `target`.
+    /// Returns [`Hop::reach`] with noise, m.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;

@@ -46,17 +46,16 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Variance of the measurements / expected one that starts the search. The operator sets the expected variance.
+/// Measured / expected variance that starts the search.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum drop of the residual without the faulty relay, in variances of the others.
+/// Minimum drop of the residual without the faulty relay, in variances.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual, and minimum drop, that show a faulty relay. It is a sum of squared relative errors: one error of
-/// 15 %.
+/// Minimum residual and drop that show a faulty relay. One measurement that is wrong by 15 % has it.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of second smallest to smallest variance to identify a relay. Each fit leaves out one relay.
+/// Minimum ratio of second smallest to smallest variance.
 const DECISIVE: f64 = 6.0;
 
 /// Maximum variance of consistent relative differences: 0.32^2, some 1.5 dB.
@@ -65,17 +64,17 @@ const CONSISTENT: f64 = 0.1;
 /// Number of collections between a failed search and the next.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay fits again; the larger counts. First a multiple of the variance, then a
-/// squared relative difference.
+/// Limits within which an excluded relay fits again; the larger counts. A multiple of the variance, and a squared
+/// relative difference.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays to identify a faulty one. With four, the other three always fit the three unknowns.
+/// Minimum number of relays to identify a faulty one. Four always leave a perfect fit.
 const FEWEST: u16 = 5;
 
 /// Minimum number of measured positions; older ones count less ([`Sums::count`]).
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight to one position's weight. Above it rounding hides this relay.
+/// Maximum mean weight divided by one position's: above, rounding wins.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -136,7 +135,7 @@ impl Trial {
         }
     }
 
-    /// Evaluates the `sums` of a collection. The `relays` members have node numbers from 1 to `nodes`.
+    /// Evaluates a collection; node numbers are 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -224,11 +223,10 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor to the estimate above which a relay doubts its measurement. Its inverse is the lower limit.
+/// Factor to the estimate (or its inverse) that a relay doubts.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd. It is then far from `expected`, and inconsistent with the
-/// others' sums `others`.
+/// Returns true if a measurement is absurd. It is far from `expected`, and inconsistent with `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -248,8 +246,8 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if an excluded relay still does not fit the others. v = 1e-12 W / I is measured, e is fitted to
-/// `others`. Compared is `(v / e - e / v) / 2`. `expected` is v by the current estimate, for the weight.
+/// Returns true if an excluded relay still does not fit `others`. Compared is `(v / e - e / v) / 2`, measured v = 1e-12
+/// W / I, fitted e. `expected` sets the weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -271,8 +269,7 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing has a faulty receiver. By `others` it should measure several times its
-/// noise `noise_w`, W. `there` has the terms of its position.
+/// Returns true if a relay that measures nothing is faulty. By `others` it should measure several times `noise_w`, W.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -287,8 +284,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a power ratio differs from 1 beyond measurement errors. `((ratio - 1 / ratio) / 2)^2` must exceed
-/// `deviations` times `unsure`, and `least`. `unsure` is the variance.
+/// Returns true if a power ratio differs from 1 beyond errors. `((ratio - 1 / ratio) / 2)^2` must exceed
+/// `deviations * unsure` and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -297,14 +294,14 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level at Tx or Rx does not fit; the larger counts. First a multiple of the variance, then a
-/// squared relative difference (factor 1.5).
+/// Limits above which the level at Tx or Rx does not fit; the larger counts. A multiple of the variance, and a squared
+/// relative difference.
 const APART: (f64, f64) = (49.0, 0.174);
 
-/// Minimum number of relays to check the levels at Tx and Rx. With fewer, the faulty one is unknown.
+/// Minimum number of relays to check the levels at Tx and Rx.
 const FEWEST_FOR_ENDS: u16 = 3;
 
-/// Measured / expected level at Tx or Rx, and its relative variance.
+/// Measured / expected level, and its relative variance.
 #[derive(Clone, Copy, Debug)]
 struct EndLevel {
     ratio: f64,
@@ -317,13 +314,13 @@ impl EndLevel {
     }
 }
 
-/// Converts a `level` at Tx or Rx to v = 1e-12 W / I of a drone there. It uses the mission's path loss over the ground.
+/// Converts a `level` at Tx or Rx to v = 1e-12 W / I. By the mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Returns which levels at Tx and Rx do not fit the relays' source `fit`.
+/// Returns which levels at Tx and Rx do not fit.
 pub(super) fn judge_ends(
     mission: &Mission,
     fit: &Fit,

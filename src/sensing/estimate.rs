@@ -33,7 +33,7 @@ pub enum InterferenceEstimate {
     Mission,
     /// Unknown interference; the relays spread in order to measure it.
     Unknown(Spread),
-    /// One interfering transmitter on the ground.
+    /// Single transmitter on the ground.
     Source {
         /// Estimated position and power.
         source: Interferer,
@@ -47,7 +47,7 @@ pub enum InterferenceEstimate {
 impl InterferenceEstimate {
     /// Returns `mission` with this estimate.
     ///
-    /// `own` is the mission's interference, for the estimate [`Mission`](Self::Mission).
+    /// `own` is used for the estimate [`Mission`](Self::Mission).
     ///
     /// # Errors
     /// [`MissionError`] if the estimate is out of range.
@@ -72,7 +72,7 @@ impl InterferenceEstimate {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Spread {
-    /// All hops of the same length.
+    /// Equal length of all hops.
     #[default]
     Even,
     /// First hop, from Tx, half as long as the others.
@@ -103,41 +103,38 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change below which an estimate is not adopted.
+/// Mean square relative change that is ignored.
 const WORTH: f64 = 1e-5;
 
-/// Mean square relative change up to which an estimate is refined. More can mean that the interference has changed.
+/// Mean square relative change that is a refinement.
 const CHANGE: f64 = 1e-4;
 
-/// Mean square change / that by chance, stationary source. Below it the estimate is only refined.
+/// Change / chance up to which a stationary source is only refined.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Mean square change / that by chance, moving source. Below it the estimate is only refined.
+/// Change / chance up to which a moving source is only refined.
 const FOLLOWED: f64 = 1.5;
 
-/// Mean square change / that by chance that shows another interferer. It applies after [`REFINED`] refinements, for a
-/// stationary source.
+/// Change / chance that shows another source, after [`REFINED`] refinements. For a stationary source.
 const ANOTHER: f64 = 64.0;
 
-/// Minimum squared relative change of the level at Rx that counts.
+/// Minimum squared relative change of the level at Rx.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of track and fit, in variances. Above it the track predicts nothing.
+/// Maximum squared deviation of the track, in variances.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth of information for a refined estimate, a factor. Information: number of positions / error variance of
-/// one.
+/// Minimum growth of information for a refinement, a factor.
 const LEARNED: f64 = 1.1;
-/// Number of refinements before the estimate stays. It is for a stationary interferer.
+/// Number of refinements before a stationary estimate stays.
 const REFINED: u8 = 4;
 
-/// Assumed time of a drone for a few metres. A moving interferer is predicted this far, plus half an interval.
+/// Assumed flight time for a few metres. A moving interferer is predicted this far.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Mean square relative error that contradicts the estimated source. The interference is then unknown.
+/// Mean square relative error that contradicts the source.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error that contradicts the mission's interference, in expected variances. The interference is then
-/// unknown.
+/// Mean square error that contradicts the mission, in expected variances.
 const GUESSED: f64 = 16.0;
 
 /// Quality of the current estimate at its adoption, and track.
@@ -166,12 +163,12 @@ pub(crate) struct Review {
     pub(crate) adopt: Option<InterferenceEstimate>,
     pub(crate) known: Knowledge,
     pub(crate) unfit: Option<Unfit>,
-    /// Levels at Tx and Rx that do not fit the relays' measurements.
+    /// Levels at Tx and Rx that do not fit.
     pub(crate) ends: EndsOff,
 }
 
-/// Compares the measurements with `estimate`; returns a new one, if any. `mission` has the current estimate. `levels`
-/// are those at Tx and Rx. `before` is the current estimate's quality at its adoption.
+/// Compares the measurements with `estimate`; returns a new one, if any. `before` is the quality of `estimate` at its
+/// adoption.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -267,7 +264,7 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit to all measurements, and its source. Clears a level of Tx or Rx that does not fit.
+/// Returns the fit and its source. Clears a level that does not fit.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -294,8 +291,7 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer where it will be when the drones have moved. `None` if it rests, or its track deviates
-/// from the fit. `heard` is the measurements' mean time.
+/// Returns a moving interferer's predicted position. `None` if it rests, or its track deviates.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -351,8 +347,8 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at Rx, W; 0 if not measured. It is the weighted mean of the measured and the computed
-/// power. If they differ too much, it is the measured one.
+/// Returns the interference power at Rx, W; 0 if not measured. It is a weighted mean with the computed power, unless
+/// they differ too much.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -428,7 +424,7 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity of a moving interferer, in variances.
 const CERTAIN: f32 = 16.0;
 
-/// Squared deviation that shows another interferer, in the track's variances. The track then starts again.
+/// Squared deviation that starts the track again, in variances.
 const ELSEWHERE: f32 = 49.0;
 
 /// Kalman filter of one axis: position, m, velocity, m/s, covariance.
@@ -448,7 +444,7 @@ impl Axis {
         }
     }
 
-    /// Advances by `seconds`. The velocity's variance grows by `walk` per second, m^2/s^3.
+    /// Advances by `seconds`; `walk` is in m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
         let [at, both, speed] = &mut self.variance;
@@ -457,7 +453,7 @@ impl Axis {
         *speed += walk * seconds;
     }
 
-    /// Updates the filter with a position `found`, m, of `variance`, m^2.
+    /// Updates with a position, m, of `variance`, m^2.
     fn take(&mut self, found: f32, variance: f32) {
         let [at, both, speed] = self.variance;
         let sum = at + variance;
@@ -502,7 +498,7 @@ impl Track {
         at: None,
     };
 
-    /// Updates the track with a source `found` at the mean time `at`. `half_life` is that of the measurements' weight.
+    /// Updates the track with a source of the mean time `at`.
     pub(crate) fn update(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]
@@ -529,7 +525,7 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the last position, and that predicted at `then`: (x, y), m. `None` if the interferer rests.
+    /// Returns the last position, and that at `then`: (x, y), m. `None` if the interferer rests.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;

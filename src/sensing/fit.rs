@@ -29,10 +29,10 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the expected error in the variance, in measured positions.
+/// Weight of the expected error, in measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D to tell right from left of the line Tx to Rx. D is the Tx-Rx distance.
+/// Minimum variance of 2 y / D that tells right from left.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from measurements.
@@ -49,7 +49,7 @@ pub struct FoundSource {
     pub is_one: bool,
 }
 
-/// Factors L D L^T of the 4 x 4 matrix: L below the diagonal, and D.
+/// Factors L D L^T of the matrix: L below, D on the diagonal.
 #[derive(Clone, Copy, Debug)]
 struct Factor {
     below: [f64; 6],
@@ -58,12 +58,12 @@ struct Factor {
     full_rank: bool,
 }
 
-/// Minimum pivot relative to the first. Below it the positions cannot separate the unknowns.
+/// Minimum pivot relative to the first.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
-    /// Factorises the matrix of ten `products` ([`Sums`]). `None` if the first three unknowns cannot be separated. The
-    /// last is omitted unless its pivot is above `least`.
+    /// Factorises the matrix of `products`; `None` if singular. The last unknown is omitted unless its pivot is above
+    /// `least`.
     fn new(products: [f64; 10], least: f64) -> Option<Self> {
         let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd] = products;
         if !(aa > 0.0) {
@@ -112,14 +112,13 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the last unknown: its inverse variance for unit errors.
+    /// Pivot of the last unknown, its inverse variance.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last
     }
 
-    /// Returns the variance of the fitted value for unit errors: `r^T G^-1 r`. r are the `terms` of the position, G the
-    /// matrix.
+    /// Returns the variance of the fitted value, `r^T G^-1 r`. r are the `terms`.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -189,7 +188,7 @@ impl Fit {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "checked")]
-    /// Returns the most likely power of a source there, W. `None` outside 1e-6 to 1e9 W.
+    /// Returns the most likely power there, W, 1e-6 to 1e9.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {
             power_w: mission.config().common.power_w,
@@ -223,27 +222,24 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if positions exceed unknowns and the variance is small. It must be below four times the expected
-    /// one.
+    /// Returns true if the variance is small: four times the expected one. Positions must exceed unknowns.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Returns the information: number of positions / error variance of one.
+    /// Returns the number of positions / error variance of one.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }
 
-    /// Returns the mean square relative difference of two sources' interference. It is over the measured positions;
-    /// sources are [`coefficients`].
+    /// Returns the mean square relative difference of two sources. Sources are [`coefficients`].
     pub(crate) fn mean_square_difference(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference of the fit to another source. It is over the measured positions; the
-    /// source is its [`coefficients`].
+    /// Returns the mean square relative difference to another source. It is given by its [`coefficients`].
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)
     }
@@ -319,7 +315,7 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative error of `sums` for a source.
+/// Returns the mean square relative error for a source.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [products @ .., av, bv, cv, dv, vv, count, _, _] = sums.numbers.map(f64::from);
     let [a, b, c, d] = *coefficients;
@@ -335,8 +331,7 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function from a position's terms to v = 1e-12 W / I. `None` without a known source, or outside the
-/// measurable range.
+/// Returns a function from terms to v = 1e-12 W / I. `None` without a known source, or out of range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -344,20 +339,19 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the search for a source, in half Tx-Rx distances.
+/// Half width of the search, in half Tx-Rx distances.
 const FARTHEST: f32 = 3.0;
 
-/// Steps from the middle to the edge of the first grid.
+/// Steps from middle to edge of the first grid.
 const COARSE: i8 = 8;
 
-/// Steps from the middle to the edge of finer grids.
+/// Steps from middle to edge of finer grids.
 const FINE: i8 = 2;
 
 /// Number of finer grids, each with 0.4 times the step.
 const FINER: u8 = 5;
 
-/// Returns X', Y' and k of the best source on grids; `None` if none fits. Positions are in half Tx-Rx distances. Y' is
-/// above `side` if `sign` is 1, below if -1. Work: 414 positions, some 16 000 instructions on a Cortex-M4F.
+/// Returns X', Y' and k of the best source on grids, if any. `sign` selects Y' above or below `side`.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],
@@ -454,7 +448,7 @@ mod tests {
         }
     }
 
-    /// Checks that the last unknown is 0 if its pivot is too small. The others then solve their equations.
+    /// Checks that the last unknown is 0 for a too small pivot.
     #[test]
     fn an_unknown_that_is_not_seen_is_left_out() {
         let factor = factor(10.0);

@@ -25,12 +25,12 @@ pub struct Level {
     pub count: f32,
 }
 
-/// Levels of Tx and Rx that do not fit the relays' measurements.
+/// Levels of Tx and Rx that do not fit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// True if Tx and Rx contradict each other, and the faulty one is unknown.
+    /// True if it is unknown whether Tx or Rx is faulty.
     pub(crate) unknown: bool,
 }
 
@@ -60,7 +60,7 @@ impl Level {
     }
 }
 
-/// Returns true for a valid level, W, or 0 (no measurement).
+/// Returns true for a valid level, W, or 0.
 pub(crate) fn is_power(power_w: f32) -> bool {
     power_w.to_bits() == 0 || is_level(power_w)
 }
@@ -70,24 +70,24 @@ pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Four terms of a position; 1 / I is linear in them. They are 1, u, `u^2 - 1/3 + t^2 + z^2` and t. `u = 2 x / D - 1`,
-/// `t = 2 y / D`, `z = 2 h / D`; D is the Tx-Rx distance.
+/// Four terms of a position; 1 / I is linear in them. 1, u, `u^2 - 1/3 + t^2 + z^2` and t; `u = 2 x / D - 1`,
+/// `t = 2 y / D`, `z = 2 h / D`.
 pub(crate) type Terms = [f32; 4];
 
-/// Returns the four terms of the position `at`. `distance_m` is the Tx-Rx distance.
+/// Returns the four terms of the position `at`.
 pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     let half = 0.5 * distance_m;
     let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Unit of interference power, W: v = 1e-12 W / I. An f32 holds the square of v.
+/// Unit of power, W: v = 1e-12 W / I. An f32 holds v squared.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
 /// Range of v for [`MEASURED_W`].
 const V: (f32, f32) = (1e-18, 1e18);
 
-/// Converts an expected v to f32. `None` outside the measurable range.
+/// Converts v to f32; `None` outside the measurable range.
 pub(crate) fn expected_v(v: f64) -> Option<f32> {
     let (least, most) = (f64::from(V.0), f64::from(V.1));
     #[expect(
@@ -97,16 +97,15 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Converts power to strength, `k = eta D^2 UNIT_W / (4 P)`, or back. P is `power_w`, eta the path-loss factor, D the
-/// Tx-Rx distance.
+/// Converts power to strength, `k = eta D^2 UNIT_W / (4 P)`, or back.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
     0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
-/// Returns the coefficients of `source`: terms to v = 1e-12 W / I. They are `k (X'^2 + Y'^2 + 1/3)`, `-2 k X'`, k and
-/// `-2 k Y'`. X' and Y' are in half Tx-Rx distances; k is the [`strength`].
+/// Returns the coefficients of `source`: `k (X'^2 + Y'^2 + 1/3)`, `-2 k X'`, k, `-2 k Y'`. X' and Y' are in half Tx-Rx
+/// distances; k is the [`strength`].
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -159,8 +158,8 @@ impl Sums {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a position with its `terms`, measured `v` and `expected` v, above 0. Its weight is multiplied by `share`;
-    /// `measured` counts its measurements. At most 60 instructions.
+    /// Adds a position, with measured `v` and `expected` v above 0. `share` multiplies its weight. At most 60
+    /// instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
@@ -196,7 +195,7 @@ impl Sums {
         }
     }
 
-    /// Multiplies all weights by `share`, and adds `seconds` to the ages.
+    /// Multiplies all weights by `share`; adds `seconds` to ages.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
         *age += *count * seconds;
@@ -237,7 +236,7 @@ impl Sums {
         (self.age_s() * 1e6) as u64
     }
 
-    /// Returns true if a relay can have sent these sums. All are finite, sums of squares not negative.
+    /// Returns true if a relay can have sent these sums.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())
@@ -247,10 +246,10 @@ impl Sums {
     }
 }
 
-/// Minimum distance of different positions, as a fraction of the Tx-Rx distance.
+/// Minimum distance of different positions, as a fraction.
 const APART: f32 = 1.0 / 200.0;
 
-/// Measurements of one relay: the mean here, and earlier sums. 120 bytes.
+/// Measurements of one relay: the mean here, and earlier sums.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Listener {
     half_life: Duration,
@@ -262,7 +261,7 @@ pub(crate) struct Listener {
     heard: Average,
 }
 
-/// Terms of the relay's position, and v = 1e-12 W / I there.
+/// Terms of the position, and v = 1e-12 W / I there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,
@@ -284,8 +283,7 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measurement at `at`. `heard` is the power, above 0, in units of [`UNIT_W`]. `expected` returns v by the
-    /// current estimate, for the weights.
+    /// Adds a measurement; `heard` is above 0, in [`UNIT_W`]. `expected` returns v by the current estimate.
     pub(crate) fn add(
         &mut self,
         now: Instant,
@@ -317,7 +315,7 @@ impl Listener {
         })
     }
 
-    /// Returns all sums with weights and ages at `now`. `expected` returns v by the current estimate.
+    /// Returns all sums with weights and ages at `now`.
     pub(crate) fn sums(
         &self,
         now: Instant,
@@ -348,7 +346,7 @@ impl Listener {
     }
 }
 
-/// Returns the remaining weight, 1 to 0, at the age `age`.
+/// Returns the remaining weight, 1 to 0.
 pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
     libm::exp2f(-(age.as_micros() as f32 / half_life.as_micros() as f32))
 }
@@ -360,7 +358,7 @@ pub(crate) struct Average {
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,
-    /// Mean age at the time `last`, s, weighted like the mean.
+    /// Mean age at `last`, s, weighted alike.
     pub(crate) behind_s: f32,
 }
 
@@ -390,7 +388,7 @@ mod tests {
     use crate::mission::{Interferer, Mission};
     use crate::place::Placement;
 
-    /// Checks the coefficients against `P / (eta l^2)` of the channel model. P is the source's power, l the distance.
+    /// Checks the coefficients against the channel model `P / (eta l^2)`.
     #[test]
     fn coefficients_are_those_of_the_channel_model() {
         let mission = Mission::try_new(paper(3)).unwrap();

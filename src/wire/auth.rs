@@ -10,7 +10,7 @@ use crate::features::AUTH;
 /// Length of an authentication tag, bytes.
 pub const TAG: usize = 8;
 
-/// Length reserved for a tag, bytes; 0 without the feature `auth`.
+/// Length reserved for a tag, bytes.
 pub(crate) const TAG_ROOM: usize = if AUTH { TAG } else { 0 };
 
 /// Secret key that all nodes of a network share.
@@ -35,7 +35,7 @@ impl Key {
 }
 
 impl core::fmt::Debug for Key {
-    /// Formats the key without its bytes, which must not appear in logs.
+    /// Formats the key without its bytes: never in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Key(..)")
     }
@@ -93,11 +93,11 @@ impl Auth {
     }
 }
 
-/// Nonces of sender and receiver. Upper half: epoch (start counter). Lower half: counts up from a random number.
+/// Nonces of both ends: epoch above, counting number below.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
-    /// Nonce of the receiver; 0 in a handshake if still unknown.
+    /// Nonce of the receiver; 0 if unknown.
     pub(crate) receiver: u64,
 }
 
@@ -129,18 +129,18 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Replay protection for one sender: the accepted frame counters. It covers the newest one and 63 below it.
+/// Replay protection for one sender: the newest 64 counters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
     /// Largest accepted frame counter plus one; 0 before the first.
     next: u32,
-    /// Accepted frame counters: bit i stands for `next - 1 - i`.
+    /// Accepted counters: bit i stands for `next - 1 - i`.
     taken: u64,
 }
 
 impl Window {
-    /// Accepts `counter` once. False for a repeated or too old one, and for `u32::MAX`.
+    /// Accepts `counter` once; false if repeated, old, or `u32::MAX`.
     pub(crate) const fn accept(&mut self, counter: u32) -> bool {
         let Some(next) = counter.checked_add(1) else {
             return false;

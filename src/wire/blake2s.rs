@@ -8,7 +8,7 @@
 
 const BLOCK: usize = 64;
 
-/// Initial state: square roots of the first eight primes, 32 fractional bits.
+/// Initial state of BLAKE2s (RFC 7693).
 const START: [u32; 8] = [
     0x6A09_E667,
     0xBB67_AE85,
@@ -20,7 +20,7 @@ const START: [u32; 8] = [
     0x5BE0_CD19,
 ];
 
-/// Order of the 16 message words in ten rounds (RFC 7693). First eight for the columns, then eight for the diagonals.
+/// Order of message words (RFC 7693): columns, then diagonals.
 const ORDER: [[[u8; 8]; 2]; 10] = [
     [[0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15]],
     [[14, 10, 4, 8, 9, 15, 13, 6], [1, 12, 0, 2, 11, 7, 5, 3]],
@@ -34,7 +34,7 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
     [[10, 2, 8, 4, 7, 6, 1, 5], [15, 11, 9, 14, 3, 12, 13, 0]],
 ];
 
-/// Returns the keyed digest of `first` followed by `second`. Together fewer than 2^32 bytes.
+/// Returns the keyed digest of both parts, under 2^32 bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;
@@ -62,7 +62,7 @@ pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     (u64::from(high) << 32 | u64::from(low)).to_le_bytes()
 }
 
-/// Compresses one block into the state. `count` is the number of bytes so far, with this block.
+/// Compresses one block; `count` includes it.
 #[inline(never)]
 fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     let mut words = [0; 16];
@@ -136,7 +136,7 @@ mod tests {
     use blake2::digest::consts::U8;
     use blake2::digest::{FixedOutput, Mac};
 
-    /// Checks the digests against the crate `blake2`. Inputs have up to 299 bytes, split anywhere.
+    /// Checks the digests against the crate `blake2`.
     #[test]
     fn the_hash_equals_the_published_one() {
         let mut state = 1_u32;

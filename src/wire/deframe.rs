@@ -24,14 +24,14 @@ error_texts!(DeframeError {
     Truncated => "the frame ended inside a COBS block",
 });
 
-/// Decoder that splits a byte stream into frames and undoes COBS.
+/// Decoder from a byte stream to frames, without COBS.
 #[derive(Clone, Debug)]
 pub struct Deframer {
     plain: [u8; MAX_DECODED],
     len: usize,
-    /// Remaining bytes of the COBS block; 0 before a code byte.
+    /// Remaining bytes of the COBS block; 0 before a code.
     run: u8,
-    /// True to insert a zero after the COBS block, except at the frame's end.
+    /// True to insert a zero after the block, unless last.
     zero_after: bool,
     oversized: bool,
 }
@@ -50,10 +50,8 @@ impl Deframer {
 
     /// Decodes one byte; at a delimiter returns the frame or an error.
     ///
-    /// Consecutive delimiters are neither. Constant work.
-    ///
     /// # Errors
-    /// [`DeframeError`], once, at the delimiter that ends the invalid frame.
+    /// [`DeframeError`], once, at the end of an invalid frame.
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], DeframeError>> {
         if byte == 0 {
             return self.delimiter();
@@ -71,8 +69,8 @@ impl Deframer {
         None
     }
 
-    /// Decodes bytes up to a COBS block's end; returns the rest. Like [`push`](Self::push) for each byte, in a quarter
-    /// of the instructions.
+    /// Decodes bytes up to a block's end; returns the rest. Like [`push`](Self::push), in a quarter of the
+    /// instructions.
     pub fn push_run<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
         let free = self.plain.get_mut(self.len..).unwrap_or_default();
         let mut stored: u8 = 0;

@@ -7,8 +7,7 @@ use crate::features::{ALTITUDE, REVERSE};
 use crate::geodetic::Sites;
 use crate::mission::{Interference, Mission, MissionConfig};
 
-/// Returns the low half of a CRC-32C over all parameters of `mission`. `FORMAT.md` has the order. It detects mistakes,
-/// not attacks: 1 in 65 536 is missed.
+/// Returns half a CRC-32C over `mission`, in the order of `FORMAT.md`. It detects mistakes, not attacks.
 pub fn digest(mission: &Mission) -> u16 {
     of(mission.config())
 }
@@ -80,7 +79,7 @@ fn add(crc: &mut Digest<'_, u32, Table<1>>, bytes: &[u8]) {
     crc.update(bytes);
 }
 
-/// Returns `digest` combined with uploaded Tx and Rx positions. `None` leaves it unchanged.
+/// Returns `digest` combined with uploaded positions, if any.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();

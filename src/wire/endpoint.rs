@@ -25,7 +25,7 @@ pub(crate) struct Endpoint {
     network: u16,
     node: u16,
     counter: u32,
-    /// Sessions with other nodes, if this node signs. Empty without the feature `auth`.
+    /// Sessions with other nodes, if this node signs.
     session: [Option<Session>; AUTH as usize],
 }
 
@@ -40,15 +40,15 @@ impl Endpoint {
         }
     }
 
-    /// Signs all frames from now on with `auth`. Nonces count up from `claim`, a random number drawn at start. After a
-    /// silence of `gone_after` another node can take a session.
+    /// Signs all frames from now on. Nonces count up from the random `claim`. After `gone_after` another node can take
+    /// a session.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
         }
     }
 
-    /// Parses a deframed frame; counts and drops damaged or foreign ones.
+    /// Parses a frame; counts and drops damaged or foreign ones.
     pub(crate) fn open<'a>(
         &self,
         decoded: Result<&'a [u8], DeframeError>,
@@ -67,7 +67,7 @@ impl Endpoint {
         None
     }
 
-    /// Checks the tag of `frame`; `None` without authentication. Counts every result but a valid new message.
+    /// Checks the tag of `frame`; `None` without authentication.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -86,14 +86,12 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once all frame counters of a signing node are used. It must restart with a new epoch: counters are
-    /// never reused.
+    /// Returns true once all frame counters are used. Counters are never reused: restart with a new epoch.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Encodes `message` to node `to` into `frame`. If node `to` cannot verify tags yet, a handshake is written
-    /// instead. The caller then sends the message later.
+    /// Encodes `message`, or a handshake that must come first. The caller then sends the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,
@@ -159,14 +157,14 @@ impl Endpoint {
         }
     }
 
-    /// Schedules a handshake to node `to`: both then know each other's nonce.
+    /// Schedules a handshake to node `to`.
     pub(crate) fn greet(&mut self, to: u16) {
         if let Some(session) = self.session_mut() {
             session.greet(to);
         }
     }
 
-    /// Returns true if node `to` can check this node's tags. False without authentication.
+    /// Returns true if node `to` can check tags.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.session().is_some_and(|session| session.knows(to))
     }

@@ -6,7 +6,7 @@ use super::message::{MAX_BODY, Message, MessageError};
 pub use super::{MAX_NODE, MAX_SWEEP};
 use crate::features::AUTH;
 
-/// Version of the frame format: the top four bits of a frame.
+/// Version of the format, in a frame's top four bits.
 pub const VERSION: u8 = 1;
 
 /// Length of a header, bytes.
@@ -25,7 +25,7 @@ pub const MAX_FRAME: usize = MAX_DECODED + 2;
 /// Header flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Header flag: the body is a handshake, valid only with a tag.
+/// Header flag: the body is a handshake, with a tag.
 const HANDSHAKE: u16 = 0x2000;
 
 /// Buffer for one encoded frame.
@@ -35,9 +35,9 @@ pub type FrameBuf = [u8; MAX_FRAME];
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Number of the network, which separates chains in range of each other.
+    /// Number of the network, which separates chains.
     pub network: u16,
-    /// Node number of the sender: 0 Tx, 1 to N relays, N + 1 Rx.
+    /// Node number: 0 Tx, 1 to N relays, N + 1 Rx.
     pub sender: u16,
     /// Node number of the destination.
     pub destination: u16,
@@ -73,8 +73,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Encodes `message`; returns the length with the delimiter. 0 if a node number is too large. Work linear in the
-/// length, at most [`MAX_FRAME`] bytes.
+/// Encodes `message`; returns the length, 0 for an invalid address. Work linear in the length.
 pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     let len = body(out).and_then(|body| message.encode(body));
     close(header, 0, len, None, out)
@@ -109,8 +108,7 @@ fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
 
-/// Completes a frame with header, tag, CRC and COBS; returns its length. 0 if `body` is `None` or an address is too
-/// large.
+/// Completes a frame; returns its length. 0 if `body` is `None` or an address is too large.
 fn close(
     header: Header,
     flags: u16,
@@ -166,11 +164,12 @@ pub struct Opened<'a> {
     pub handshake: bool,
 }
 
-/// Parses `plain`, a frame without COBS and delimiter. Checks the CRC, but neither tag nor body. The receiver checks
-/// the addresses before it decodes the body.
+/// Parses `plain`, a frame without COBS and delimiter.
+///
+/// Checks the CRC, but neither tag nor body.
 ///
 /// # Errors
-/// [`FrameError`]. The CRC is checked first: other errors are of intact frames.
+/// [`FrameError`]. The CRC is checked first.
 pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
     let (head, rest) = checked
@@ -208,7 +207,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     })
 }
 
-/// Decodes header and message, without verifying the tag.
+/// Decodes header and message; the tag is not verified.
 ///
 /// # Errors
 /// [`FrameError`]; a handshake is not a message.
@@ -226,8 +225,7 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// Encodes a frame by COBS in place; returns the length with delimiter. The frame is at `out[1..=len]`, fewer than 254
-/// bytes. The crate `cobs` would need a second buffer.
+/// Encodes a frame by COBS in place; returns its length. The frame is `out[1..=len]`, under 254 bytes.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;

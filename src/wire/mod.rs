@@ -26,7 +26,7 @@ pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI
 /// Largest valid node number; 4095 is reserved for broadcasts.
 pub const MAX_NODE: u16 = 4094;
 
-/// Number of nearest nodes in one direction that get hellos. One of them becomes the neighbour.
+/// Number of nearest nodes that get hellos, per direction.
 pub(crate) const CANDIDATES: u16 = 4;
 
 /// Maximum length of a frame with sixteen target SIRs, bytes.

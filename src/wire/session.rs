@@ -33,7 +33,7 @@ use crate::time::{Duration, Instant};
 /// Actual sender of a frame with this relay's own number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sender {
-    /// This relay: the frame is an echo.
+    /// Echo of this relay's own frame.
     Itself,
     /// Another node with an unknown claim; perhaps a forger.
     Unknown,
@@ -47,14 +47,13 @@ pub(crate) struct Rival {
     pub(crate) number: u32,
     /// True if its epoch is newer; false if equal.
     pub(crate) newer_epoch: bool,
-    /// True if it has no setpoint and is outside the chain.
+    /// True if it has no setpoint.
     pub(crate) passive: bool,
-    /// True if the claim was certainly sent after this relay's start. Proof: a signature, or this relay's claim number
-    /// in the message.
+    /// True if the claim was sent after this relay's start. Proof: a signature, or this relay's claim number.
     pub(crate) is_current: bool,
 }
 
-/// Bit in the claim number of a relay with a position. The larger of two claim numbers wins.
+/// Bit in the claim number of a relay with a position.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of a handshake's body, bytes.
@@ -62,11 +61,10 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference of two nonces' lower halves, same node and epoch. A larger one shows two nodes with the same
-/// number.
+/// Maximum difference of one node's nonces in an epoch.
 const MAX_GAP: u32 = 1 << 12;
 
-/// Consecutive handshakes of an older epoch before it is reported. Delayed frames can cause fewer.
+/// Old handshakes in a row that are reported.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -74,15 +72,15 @@ struct Peer {
     node: u16,
     /// True to send a handshake to this node.
     handshake: bool,
-    /// True if the next handshake always requests a reply. If false, only until the node has proved its presence.
+    /// True if the next handshake always requests a reply.
     requests_reply: bool,
-    /// True if the node has repeated this relay's nonce. It is then present, and both know each other's nonce.
+    /// True if the node has repeated this relay's nonce.
     proven: bool,
     /// Value of `Session::clock` at the last use.
     used: u32,
-    /// Time of the last proof of the node's presence. The largest nonce so far also counts as proof.
+    /// Time of the last proof of presence.
     last_proof: Instant,
-    /// Lower half of this relay's nonce; the upper half is the epoch.
+    /// Lower half of this relay's nonce.
     own_number: u32,
     /// Largest nonce received from the node; 0 before the first.
     nonce: u64,
@@ -90,19 +88,19 @@ struct Peer {
     older: OlderHandshakes,
 }
 
-/// Counter of consecutive handshakes with an outdated nonce. Several show a reused or older epoch.
+/// Counter of consecutive handshakes with an outdated nonce.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,
     /// Frame counter of the last outdated handshake, plus one.
     next: u32,
-    /// Number of outdated handshakes in a row, with rising frame counters.
+    /// Number of outdated handshakes in a row.
     times: u8,
 }
 
 impl OlderHandshakes {
-    /// Counts an outdated handshake; true at the fifth in a row. `WENT_BACK` is five. They need one epoch and rising
-    /// frame counters; replays do not count.
+    /// Counts an outdated handshake; true at the fifth in a row. They need one epoch and rising counters; replays do
+    /// not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -136,11 +134,11 @@ pub(crate) struct Session {
     epoch: u32,
     /// Silence after which another node takes over a node number.
     gone_after: Duration,
-    /// Claim number, random at start; the larger of two wins. The lower halves of nonces count up from it.
+    /// Random claim number; the larger of two wins. Nonces count up from it.
     claim: u32,
     /// Lower half of the last created nonce.
     last_number: u32,
-    /// Claim of another node to this relay's number; `None` once read.
+    /// Claim of another node to this number; `None` once read.
     rival: Option<Rival>,
     /// Number of uses of entries, wrapping.
     clock: u32,
@@ -154,9 +152,9 @@ pub(crate) struct Session {
 /// Result of authenticating a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// New valid message: its sender is present. `first` is true for the session's first proof.
+    /// New valid message; `first` in the session.
     Fresh { first: bool },
-    /// New handshake with this relay's nonce: its sender is present. `first` is true for the session's first proof.
+    /// New handshake with this relay's nonce; `first` in the session.
     Handshake { first: bool },
     /// Handshake without this relay's nonce: perhaps a recording.
     Unproven,
@@ -166,13 +164,12 @@ pub(crate) enum Checked {
     Forged,
     /// Authentic frame that is repeated or too old.
     Replayed,
-    /// Fifth outdated handshake in a row: the epoch is old or reused.
+    /// Fifth outdated handshake in a row.
     WentBack,
 }
 
 impl Session {
-    /// Creates an empty table. Nonces count up from `claim`, drawn at start. After a silence of `gone_after` another
-    /// node can replace a node.
+    /// Creates an empty table; nonces count up from `claim`. After `gone_after` another node can replace a silent one.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -199,7 +196,7 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to node `to`, whose presence is then unproved.
+    /// Schedules a handshake to node `to`, unproved until then.
     pub(crate) fn greet(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -208,7 +205,7 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes. Nonces count up from `claim` or the last one, the larger.
+    /// Forgets all nodes; nonces count up from `claim` or more.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.last_number {
             self.claim = claim;
@@ -217,8 +214,7 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to `to`, once per lease renewal `number`. It shows this relay's nonce: a duplicate node
-    /// then learns of it.
+    /// Schedules a handshake to `to`, once per renewal `number`. A duplicate node then learns of this relay.
     pub(crate) fn show(&mut self, to: u16, number: u16) {
         if self.shown == Some(number) {
             return;
@@ -238,8 +234,8 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake with reply from the silent node `to`. Not if it restarted in the same epoch: it would
-    /// learn its former nonce. It could then use frame counters twice.
+    /// Schedules a handshake with reply from the silent node `to`. Not after its restart in the same epoch: it would
+    /// reuse frame counters.
     pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;
@@ -253,7 +249,7 @@ impl Session {
         self.rival.take()
     }
 
-    /// Returns a node that must get a handshake, and marks it as sent.
+    /// Returns a node that must get a handshake now.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;
@@ -386,7 +382,7 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns who sent `frame`, which has this relay's number. Work: one tag.
+    /// Returns who sent `frame` with this relay's number.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
@@ -404,7 +400,7 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns which node made `nonce`: this relay or another. `Unknown` if its epoch is older than this relay's.
+    /// Returns which node made `nonce`; `Unknown` for an older epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {
@@ -434,8 +430,8 @@ impl Session {
         Some(peer)
     }
 
-    /// Creates an entry for `node` if there is none. A full table loses an unpinned entry: unproved first, else least
-    /// recently used. Ends after four billion entries: a nonce must not be reused.
+    /// Creates an entry for `node`. A full table loses an unpinned entry. None after four billion: nonces must not be
+    /// reused.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
@@ -479,8 +475,7 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch are of two nodes. Their lower halves differ by more than [`MAX_GAP`],
-/// without [`RAISED`].
+/// Returns true if two nonces of one epoch are of two nodes. They differ by more than [`MAX_GAP`], without [`RAISED`].
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > MAX_GAP

@@ -20,8 +20,7 @@ pub struct Upload {
     base: u16,
     /// Valid parameters, with a single interferer and no field.
     config: MissionConfig,
-    /// Positions of Tx and Rx; `None` for the configured ones. They are valid, but each relay checks that they fit the
-    /// mission.
+    /// Positions of Tx and Rx; `None` for the configured ones. Each relay checks that they fit the mission.
     sites: Option<Sites>,
 }
 
@@ -32,13 +31,13 @@ pub struct Upload {
 pub enum UploadError {
     /// The version is 0: the mission loaded before flight.
     Version,
-    /// The number of relays differs from the mission loaded before flight.
+    /// The number of relays differs from the loaded mission.
     Relays,
-    /// The uploaded mission, or the loaded one, has an interference field.
+    /// A mission, uploaded or loaded, has an interference field.
     Field,
     /// A parameter is outside its range.
     Mission(MissionError),
-    /// The upload was made for another loaded mission than this relay's.
+    /// The upload was made for another loaded mission.
     Base,
     /// The mission does not fit Tx and Rx, the geofence or the settings.
     ///
@@ -189,7 +188,7 @@ impl Upload {
     }
 }
 
-/// Checks that `sites` are `distance_m` from each other. Without the feature `flight` all valid positions are accepted.
+/// Checks that `sites` are `distance_m` from each other. Without the feature `flight` all are accepted.
 pub(crate) fn check_line(sites: Sites, distance_m: f32) -> Result<(), LineError> {
     #[cfg(feature = "flight")]
     let fits = crate::flight::axis::Axis::between(sites)

@@ -7,35 +7,33 @@
 
 use super::outlook::Outlook;
 
-/// Tried fractions of the computed moves, in order, until the chain improves.
+/// Fractions of the moves, tried until the chain improves.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move, divided by the distance from the interferer. It also limits the change of ln(target
-/// SIR).
+/// First *trust*: maximum move over the distance from the interferer.
 const TRUST: f32 = 0.5;
 
-/// Smallest trust with a prediction of the final target. A smaller trust would predict too low.
+/// Smallest trust that allows a prediction.
 const RESTRAINED: f32 = 0.05;
 
 /// Trust below which the improvement ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum assumed loss of length per ln(target SIR), in units of the Tx-Rx distance. It is a divisor; usual is 0.5.
+/// Minimum length lost per ln(target SIR), in Tx-Rx distances. It is a divisor.
 const LEAST_SLOPE: f32 = 0.3;
 
 /// First increase of the target's limit, in ln(SIR).
 const EXCESS: f32 = 0.03;
 
-/// First upper limit on the slack, in units of the Tx-Rx distance. More slack could outweigh the penalty near the
-/// interferer.
+/// First upper limit on the slack, in Tx-Rx distances. More slack could outweigh the penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest upper limit on the slack, in units of the Tx-Rx distance.
+/// Smallest upper limit on the slack, in Tx-Rx distances.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of negative slack relative to positive slack.
 const SHORT: f32 = 2.0;
 
-/// Increase of ln(target SIR) below which an iteration is idle. Two idle iterations end the improvement.
+/// Increase of ln(target SIR) that counts as idle. Two idle iterations end the improvement.
 const CLOSE: f32 = 3e-6;
 
 /// Expected increase of ln(target SIR) that ends the improvement.
@@ -44,18 +42,18 @@ const SETTLED: f32 = 0.3 * CLOSE;
 /// Expected increase of ln(target SIR) below which predictions are possible.
 const FORESEEN: f32 = 1e-4;
 
-/// Iterations after which a chain far short of Rx has diverged.
+/// Iterations after which a far too short chain has diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Largest shortfall of a chain that is improved again, in units of the Tx-Rx distance.
+/// Largest shortfall that is improved again, in Tx-Rx distances.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
-    /// Try the fraction `share` of the moves, with the target `sigma`.
+    /// Try the fraction `share` of the moves at the target `sigma`.
     Try { share: f32, sigma: f32 },
     /// Raise the target as far as the unchanged chain allows.
     Raise,
@@ -69,16 +67,16 @@ pub(crate) enum AscentStep {
 pub(crate) struct Ascent {
     /// Target of the current chain, ln(SIR).
     pub(crate) sigma: f32,
-    /// Slack at the target, m: length beyond Rx. Below 0 if the chain is too short.
+    /// Length beyond Rx at the target, m; below 0 if short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target at which the chain is compared with the upper bound, ln(SIR). It rises if the chain misses the bound.
+    /// Target that is compared with the upper bound, ln(SIR).
     pub(crate) limit: f32,
     /// Next increase of `limit`, in ln(SIR).
     excess: f32,
-    /// Upper limit on the slack, in units of the Tx-Rx distance. It falls if relays are too near the interferer.
+    /// Upper limit on the slack, in Tx-Rx distances. It falls if relays are too near the interferer.
     spare: f32,
-    /// Penalty for relays too near the interferer, m; reduces the slack.
+    /// Penalty for relays too near the interferer, m.
     pub(crate) penalty: f32,
     distance_m: f32,
     /// Change of slack per ln(target SIR), m; below 0.
@@ -101,7 +99,7 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts at the target `sigma` with the slack `slack`, m. Targets are in ln(SIR), never below `floor`.
+    /// Starts at the target `sigma` with the slack `slack`, m. Targets are ln(SIR), at least `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -131,17 +129,17 @@ impl Ascent {
         }
     }
 
-    /// Returns the upper limit on the slack, m. More slack does not count.
+    /// Returns the upper limit on the slack, m.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the limit on the slack.
+    /// Returns true if [`tighten`](Self::tighten) would lower the limit.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the limit on the slack if relays are too near the interferer. Returns true if lowered.
+    /// Lowers the limit on the slack; true if it did.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -150,7 +148,7 @@ impl Ascent {
         true
     }
 
-    /// Returns the next action after a lower limit on the slack. `slack` is the slack under the new limit, m.
+    /// Returns the next action after a lower limit on the slack.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -163,7 +161,7 @@ impl Ascent {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the target's limit, and returns the next action. The chain met the old limit, but not the upper bound.
+    /// Raises the target's limit, and returns the next action.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -175,7 +173,7 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds one segment's results: expected increase of slack, and its change with the target.
+    /// Adds one segment's expected increase of slack, and its slope.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -203,7 +201,7 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) will change by less than `by`.
+    /// Returns true if ln(target SIR) changes by less than `by`.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -214,14 +212,12 @@ impl Ascent {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if a chain short of Rx is worth another improvement. Its shortfall is below a tenth of the Tx-Rx
-    /// distance.
+    /// Returns true if a short chain is worth another improvement.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the improvement is predicted to end at most at `sigma`. `turn` is its next action. False without
-    /// a prediction.
+    /// Returns true if the improvement should end at most at `sigma`. False without a prediction.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -232,8 +228,7 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target that the moved chain should just meet, ln(SIR). `share` is the fraction of the computed
-    /// moves.
+    /// Returns the target that the moved chain should meet, ln(SIR).
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -252,13 +247,12 @@ impl Ascent {
         }
     }
 
-    /// Returns the target at which the chain would just reach Rx, ln(SIR). `slack` is that at `sigma`, m; negative
-    /// slack counts twice.
+    /// Returns the target that just reaches Rx, ln(SIR). Negative slack counts twice.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current one. `slack` is its slack at the target `sigma`, m.
+    /// Returns true if a trial chain is better than the current.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -267,7 +261,7 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the next action after a failed trial. It is a smaller fraction, or new, more limited moves.
+    /// Returns the next action after a failed trial.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -280,8 +274,7 @@ impl Ascent {
         turn
     }
 
-    /// Accepts the trial chain, and returns the next action. `share` is the fraction of its moves. `slack` is the slack
-    /// at the target `sigma`, m.
+    /// Accepts the trial chain, and returns the next action.
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -300,7 +293,7 @@ impl Ascent {
         }
     }
 
-    /// Returns the next action after the target rose to `sigma`. `slack` is the slack there, m.
+    /// Returns the next action after the target rose to `sigma`.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

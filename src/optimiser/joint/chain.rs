@@ -54,13 +54,12 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x with room for later relays, m. `end_m` is that of the previous relay, `step` the minimum
-    /// step from it.
+    /// Returns the largest x with room for later relays, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
 
-    /// Returns the sender of the hop to relay `index`: Tx, or the previous relay at `from`.
+    /// Returns the sender of the hop to relay `index`.
     pub(super) fn sender(&self, index: u16, from: Placement) -> Sender {
         if index <= 1 {
             return Sender::transmitter(self.mission);
@@ -77,8 +76,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         }
     }
 
-    /// Returns c, the target divided by the gain, for the hop to `index`. With noise it includes 1 + noise /
-    /// interference at the sender. The receiver's position is not known yet.
+    /// Returns c, the target divided by the gain. With noise it includes `1 + noise / interference` at the sender.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -86,7 +84,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the fixed altitude of relay `index`, m. `None` if it is free, or the mission allows only one.
+    /// Returns the fixed altitude of relay `index`, m; `None` if free.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -97,8 +95,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude of relay `index`, m, interpolated between fixed ones. Outside them it stays if `level`,
-    /// else falls to the lowest at Tx and Rx.
+    /// Returns the altitude interpolated between fixed ones, m. Outside it stays if `level`, else falls to the lowest.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -120,8 +117,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack for `target`, m, and its derivatives. They are by the last relay's position `at`. Slack:
-    /// maximum length of the last hop minus its length.
+    /// Returns the slack and its derivatives by the last relay. Slack: maximum length of the last hop minus its length,
+    /// m.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = self.seat(self.relays());
         let most = site::last_most(self.mission, power_w, room);
@@ -133,7 +130,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (slack, outlook)
     }
 
-    /// Returns an upper bound on the chain's SIR, in ln(SIR). It is the lower maximum of the first and last hop.
+    /// Returns an upper bound on the chain's ln(SIR).
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = self.seat(self.relays());
         let first = self.room(1);
@@ -142,8 +139,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the lowest target, ln(SIR), that limits every hop's length. A lower one allows any length beyond the
-    /// interferer.
+    /// Returns the lowest target that limits every hop, ln(SIR).
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -152,14 +148,13 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 }
 
-/// Gains of all hops in both directions, in units of the Tx-Rx distance. SIR = gain times inverse interference at the
-/// receiver, divided by squared length. At Rx and Tx the gain includes the interference. They can also be stored as
-/// logarithms.
+/// Gains of all hops both ways, in Tx-Rx distances. `SIR = gain / (interference l^2)`; at Rx and Tx the gain has the
+/// interference.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
     /// Position of the interferer, in units of the Tx-Rx distance.
     pub(super) source: Triple,
-    /// Noise divided by the interferer's power received at the Tx-Rx distance.
+    /// Noise divided by the interferer's power at the Tx-Rx distance.
     pub(super) noise: f32,
     relay: f32,
     to_rx: f32,
@@ -179,7 +174,7 @@ impl Gains {
         from_rx: 0.0,
     };
 
-    /// Returns the gains for relays of `power_w` watts. `stored` converts each gain, for example to its logarithm.
+    /// Returns the gains for `power_w` watts, converted by `stored`.
     pub(super) fn new(
         chain: &Chain<'_, impl SeatOf>,
         power_w: f32,
@@ -198,8 +193,7 @@ impl Gains {
         }
     }
 
-    /// Returns the forward and backward gain of hop `k`. `k` is 1 (from Tx) to N + 1 (to Rx); `relays` is N. `sent_by`
-    /// scales a gain to the relay's power.
+    /// Returns hop `k`'s gains, forward and backward. `k` is 1 (from Tx) to N + 1 (to Rx).
     pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
         let there = match k {
             1 => self.from_tx,
@@ -215,7 +209,7 @@ impl Gains {
     }
 }
 
-/// Returns the best reception of Tx for a relay at Rx's x. Tried are the limits of `room`, and the lateral offset 0.
+/// Returns where a relay at Rx's x receives Tx best.
 pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -232,7 +226,7 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays whose moves are in memory: one segment. 0 without the feature `altitude`.
+/// Number of moves in memory; 0 without the feature `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
@@ -241,9 +235,9 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// Slope of the slack by the last relay's x, y and h, m/m.
+    /// First derivatives of the slack by the last relay, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives by the last relay: xx, xy, xh, yy, yh, hh, 1/m.
+    /// Second derivatives: xx, xy, xh, yy, yh, hh, 1/m.
     pub(super) bend: [f32; 6],
 }
 
@@ -288,7 +282,7 @@ pub(super) fn last_of(mission: &Mission) -> u8 {
     u8::try_from(last).unwrap_or(u8::MAX)
 }
 
-/// Returns the relays of a segment: number from 0, and chain index.
+/// Returns a segment's relays: number from 0, and index.
 pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
     let first = u16::from(segment) * SEGMENT_RELAYS;
     // Counted in u16 at both ends, since zipping two ranges backward may panic.
@@ -316,7 +310,7 @@ impl Seat {
         }
     }
 
-    /// Returns the profile of a relay with altitude and power `own`. The altitude is fixed if `holds` is true.
+    /// Returns a relay's profile; `holds` fixes its altitude.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

@@ -27,14 +27,14 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions tried per relay: the current one, two either way.
+/// Positions tried per relay: the current one, two either way.
 const STATES: usize = 5;
-/// Tried moves, in step widths. Of equally good moves the first wins.
+/// Tried moves, in step widths; the first of equals wins.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
 /// Number of bits that store one of the five states.
 const BITS: usize = 3;
 
-/// Step width that ends the search from one initial chain, in units of the Tx-Rx distance.
+/// Step width that ends a search, in Tx-Rx distances.
 const NARROWEST: f32 = 1.0 / 131_072.0;
 /// Relative improvement below which the step width is halved.
 const LITTLE: f32 = 1e-3;
@@ -46,11 +46,10 @@ const AT_ONCE: u16 = 3;
 /// Number of relays per call in all other work.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to a squared length, in units of the squared Tx-Rx distance: no hop time is 0.
+/// Amount added to a squared length: no hop time is 0.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first x, last x, first step width, in units of the Tx-Rx distance. Equal x mean that the relays
-/// gather there at their minimum separation.
+/// Initial chains: first x, last x, first step width, in Tx-Rx distances. Equal x mean the minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -61,20 +60,20 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Index of the initial chain that begins with the best one so far. Used only if a lateral offset or altitude is free.
+/// Initial chain that begins with the best one so far. Used only if an offset or altitude is free.
 const BEST: u8 = 8;
-/// First step width of the initial chain [`BEST`], in units of the Tx-Rx distance.
+/// First step width of [`BEST`], in Tx-Rx distances.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of further initial chains, as fractions. The ranges: 0 to the largest offset away from
-/// the interferer, common to highest altitude.
+/// Offset and altitude of further initial chains, as fractions. Offsets are away from the interferer, altitudes from
+/// the common one up.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Time slots of a relay's hops, each begin and end a fraction of the frame.
+/// Time slots of a relay's hops: begin and end as fractions of the frame.
 ///
-/// The fractions are 0 to 1, multiples of about 6e-8; a shorter slot can become empty. The slots follow one another:
-/// toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then back from hop N + 1 to hop 1. A slot begins where the slot
-/// before it ends, to the bit. Tx and Rx compute nothing: their slots are `from_tx` and `to_tx` of the first relay,
-/// `to_rx` and `from_rx` of the last. For a radio, all nodes also need the length of the frame and a common clock.
+/// Fractions are 0 to 1, multiples of about 6e-8; a shorter slot can become empty. The order is toward Rx from hop 1
+/// (from Tx) to hop N + 1 (to Rx), then back. A slot begins where the slot before it ends, to the bit. The slots of Tx
+/// are `from_tx` and `to_tx` of the first relay, those of Rx `to_rx` and `from_rx` of the last. For a radio, all nodes
+/// also need the length of the frame and a common clock.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
@@ -96,14 +95,14 @@ pub struct SlotShares {
     pub bits_per_hz: f32,
 }
 
-/// Tried position, and the inverse interference there: 1 at Tx and Rx.
+/// Tried position, and the inverse interference there.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
     quiet: f32,
 }
 
-/// Tried position of a relay, and the shortest time from Tx.
+/// Tried position of a relay, and the time from Tx.
 #[derive(Clone, Copy, Debug)]
 struct State {
     spot: Spot,
@@ -120,18 +119,17 @@ impl State {
     };
 }
 
-/// Hop: its gains, r, and the minimum separation. r is the data rate back divided by that to Rx. `gains` are forward
-/// and backward, divided by the SNR gap.
+/// Hop: its gains divided by the SNR gap, r, and the minimum separation. r is the data rate back divided by that to Rx.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
     reverse: f32,
-    /// Minimum squared distance, in units of the squared Tx-Rx distance; `None` at Tx or Rx.
+    /// Minimum squared distance; `None` at Tx or Rx.
     apart: Option<f32>,
 }
 
 impl Hop {
-    /// Returns the forward and backward SINR, divided by the SNR gap.
+    /// Returns the forward and backward SINR divided by the SNR gap.
     fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
         let l = square(x) + square(y) + square(h) + SHORTEST;
@@ -139,7 +137,7 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times for one bit toward Rx and r bits back. Infinite if two relays are too close or out of order.
+    /// Returns the times for one bit to Rx and r back. Infinite if too close or out of order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
@@ -163,43 +161,42 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Positions of an initial chain. The field counts the relays done.
+    /// Positions of an initial chain; relays done.
     Begin(u16),
-    /// Forward: the fastest moves from Tx to each node. The field is the next node, 1 to N + 1 (Rx).
+    /// Forward, to the fastest moves: next node, 1 to N + 1 (Rx).
     Pass(u16),
-    /// Backward: moves the relays by the best combination. The fields are the next relay and its move's index in
-    /// [`MOVES`].
+    /// Backward, by the best moves: next relay, index in [`MOVES`].
     Back(u16, u8),
-    /// Sums of hop times, and the lowest SIR. The field is the next node.
+    /// Sums of hop times, and the lowest SIR: next node.
     Sum(u16),
 }
 
-/// Solver of a chain with fitted slots: the largest data rate.
+/// Solver of the largest data rate with fitted slots.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
-    /// Gains from relays of 1 W, divided by the SNR gap.
+    /// Gains of 1 W relays, divided by the SNR gap.
     gains: Gains,
-    /// Positions of the current chain, in units of the Tx-Rx distance.
+    /// Positions of the current chain, in Tx-Rx distances.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. At the end x and y hold sums of hop times from Tx, forward and back.
+    /// Positions of the best chain. At the end x and y hold sums of hop times.
     best_places: [Triple; RELAYS],
-    /// Best state of the previous relay for each state, three bits each.
+    /// Best previous state for each state, three bits each.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
     /// Number of the initial chain, from 0.
     number: u8,
     rounds: u8,
-    /// Coordinate that changes now: 0 for x, 1 for y, 2 for altitude.
+    /// Coordinate that changes now: 0 x, 1 y, 2 altitude.
     axis: u8,
     width: f32,
-    /// Total hop time of the current chain. Infinite if relays are too close.
+    /// Total hop time; infinite if relays are too close.
     time: f32,
     /// Total hop time before the current round.
     before: f32,
-    /// Total hop time of the best chain; 0 before the first.
+    /// Total hop time of the best chain; 0 at first.
     best: f32,
-    /// Sums of the hop times toward Rx and back to Tx.
+    /// Sums of hop times, toward Rx and back.
     sums: [f32; 2],
     worst: f32,
 }
@@ -224,7 +221,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         worst: 0.0,
     };
 
-    /// Continues by one bounded portion. `Ready` with the linear SIR of the worst hop.
+    /// Continues by one portion; `Ready` with the linear worst SIR.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let relays = chain.relays();
         match self.work {
@@ -313,8 +310,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns node `index` moved by `by` along the current coordinate. It stays within its limits. 0 is Tx, N + 1 is
-    /// Rx.
+    /// Returns node `index` moved by `by`, inside its limits. 0 is Tx, N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
@@ -382,7 +378,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         self.work = Work::Pass(end);
     }
 
-    /// Continues after the best moves take the total hop time `time`. The last relay is in `state`.
+    /// Continues after the best moves take the time `time`.
     fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
@@ -392,7 +388,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Moves relays to their best positions, from relay `index` toward Tx. Relay `index` is in `state`.
+    /// Moves relays to their best positions, from `index` toward Tx.
     fn back(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, state: u8) {
         let end = index.saturating_sub(OTHERS_AT_ONCE);
         let mut state = usize::from(state);
@@ -410,7 +406,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the next coordinate and step width. After the last, it stores a better chain and starts the next one.
+    /// Selects the next coordinate, step width or initial chain.
     fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;
@@ -442,7 +438,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns both times of the hop to node `index`. Lowers `worst` to the hop's SIR.
+    /// Returns both hop times to node `index`; lowers `worst`.
     fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
@@ -458,8 +454,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of hop `hop`'s slot toward Rx, and the begin of its slot back. Both are fractions of the frame.
-    /// Hop 0 gives 0 and 1; `hop` is at most N + 1.
+    /// Returns the end of hop `hop`'s slot to Rx, and begin of its slot back. Fractions of the frame; hop 0 gives 0 and
+    /// 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {
@@ -475,7 +471,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         [end.min(middle), 1.0 - share(back)]
     }
 
-    /// Returns position and slots of relay `index` in the solved chain.
+    /// Returns the solved position and slots of relay `index`.
     pub(super) fn place(
         &self,
         chain: &Chain<'_, impl SeatOf>,
@@ -503,7 +499,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains; more if offsets or altitudes are free.
+/// Returns the number of initial chains.
 fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {
@@ -519,7 +515,7 @@ impl Gains {
         in_noise(square(x) + square(y) + square(h), self.noise)
     }
 
-    /// Returns the hop to node `index`, 1 to N + 1 (Rx).
+    /// Returns the hop to node `index`, 1 to N + 1.
     fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Hop {
         let (config, relays) = (chain.mission.config(), chain.relays());
         let is_between = index > 1 && index <= relays;

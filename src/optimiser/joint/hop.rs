@@ -42,8 +42,8 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end of a hop that just meets its target. Its dependent coordinate follows from the others w, the
-/// start p and the target.
+/// Derivatives of the end of a hop that just meets its target. One coordinate follows from two free ones w and the
+/// start p.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -53,9 +53,9 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the dependent coordinate by w and p. Row i is for w_i, its three values for p.
+    /// Second derivatives by w_i (rows) and p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate: w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives: w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
     /// Derivative of the dependent coordinate by ln(target SIR), m.
     pub(super) by_target: f32,
@@ -72,9 +72,8 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Returns the derivatives of the hop from `from` to `to`. The interferer is at `source`. All points have the
-    /// dependent coordinate first. `c` is the target divided by the gain. `noise` is divided by the interferer's power
-    /// at 1 m, 1/m^2. [`Reach::FIXED`] at the rim, where no coordinate depends on the others.
+    /// Returns the derivatives of the hop near an interferer at `source`. All points have the dependent coordinate
+    /// first. [`Reach::FIXED`] at the rim.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -123,8 +122,7 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of `q(s) = s / (1 + nu s)`. s is the squared distance from the interferer, m^2; nu is
-/// the noise, 1/m^2.
+/// Derivatives q'(s) and 2 q''(s) of `q(s) = s / (1 + nu s)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -153,7 +151,7 @@ pub(crate) enum Coordinate {
     H,
 }
 
-/// Vector of x, y and h: a position, m, or a derivative.
+/// Values for x, y and h: a position, m, or derivative.
 pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
@@ -174,7 +172,7 @@ impl Coordinate {
         self.ordered(bend).map(|row| self.first(row))
     }
 
-    /// Restores a matrix to (x, y, h); the inverse of [`Coordinate::first_of`].
+    /// Restores a matrix; the inverse of [`Coordinate::first_of`].
     pub(crate) fn back_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.restored(bend.map(|row| self.back(row)))
     }
@@ -204,8 +202,8 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition `s + spare >= c l` for a hop to meet its target. s is the squared distance from receiver to interferer,
-/// m^2. l is the squared length of the hop, m^2. `c` is the target divided by the gain, raised by noise.
+/// Condition `s + spare >= c l` for a hop to meet its target. s: squared distance receiver to interferer, l: squared
+/// length, m^2. `c`: target divided by gain, raised by noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
@@ -220,8 +218,7 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the condition with noise, linearised at the squared distance `s`, m^2. `noise` is divided by the
-    /// interferer's power at 1 m, 1/m^2. `c` is the target divided by the gain, and `e` is `c - 1`.
+    /// Returns the condition with noise, linearised at `s`, m^2. `e` is `c - 1`, without cancellation.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

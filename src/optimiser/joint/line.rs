@@ -15,10 +15,10 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use core::task::Poll;
 
-/// Number of relays per call: for one direction, and for both.
+/// Relays per call: one direction, both.
 const AT_ONCE: [u16; 2] = [20, 2];
 
-/// Memory of a relay in Algorithm 1: x and its limit, m.
+/// Memory of a relay in Algorithm 1: lengths in m.
 pub(super) trait Noted {
     fn lengths_m(&mut self) -> &mut [f32; 2];
 }
@@ -29,18 +29,18 @@ impl Noted for [f32; 2] {
     }
 }
 
-/// Progress of Algorithm 1 for one target: to Rx, then back.
+/// Progress of Algorithm 1: to Rx, then back.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Last computed relay; 0 at the start and at the end.
+    /// Last computed relay; 0 at start and end.
     index: u16,
     /// True on the way from Rx back to Tx.
     is_back: bool,
-    /// True if some relay must stay short, or data flow both ways.
+    /// True if some relay must stay short, or both directions count.
     holds_back: bool,
-    /// x of relay `index`, m. Farthest toward Rx; final on the way back.
+    /// x of relay `index`, m; on the way back final.
     x_m: f32,
-    /// Largest x of relay `index` with room for later relays, m.
+    /// Largest x with room for later relays, m.
     end_m: f32,
 }
 
@@ -53,9 +53,8 @@ impl Line {
         end_m: 0.0,
     };
 
-    /// Continues Algorithm 1 for the target `sigma`, in ln(SIR). `Ready(None)` if it cannot be met. Else true if some
-    /// relay must stay short of its farthest x. `cells` has lateral offsets and altitudes; `notes` receives the x.
-    /// `closed` keeps relay 1 from Rx and the last from Tx, as fractions of the Tx-Rx distance.
+    /// Continues Algorithm 1 for `sigma`, in ln(SIR); `None` if it is missed. True if some relay must stay short of its
+    /// farthest x.
     pub(super) fn step<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -86,8 +85,7 @@ impl Line {
         Poll::Pending
     }
 
-    /// Computes the farthest x of the next relay toward Rx. For the last relay it is final. `None` if `target` cannot
-    /// be met.
+    /// Computes the next farthest x toward Rx; `None` if missed. For the last relay it is final.
     fn there<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -126,7 +124,7 @@ impl Line {
         Some(())
     }
 
-    /// Computes the final x of the relay before `index`, at `x_m`. `None` if `target` cannot be met.
+    /// Computes the final x before `index`; `None` if missed.
     fn back<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -147,7 +145,7 @@ impl Line {
     }
 }
 
-/// Returns the hop to relay `index`, exactly as that relay computes it. Its end is at most `end_m`, m.
+/// Returns the hop to `index`, exactly as that relay computes it.
 fn hop<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,
@@ -173,8 +171,7 @@ fn hop<const RELAYS: usize>(
     .ending(end_m)
 }
 
-/// Returns the slack and the final x of the last relay, m. `reaches` are the farthest x of the last two relays, `end_m`
-/// the limit.
+/// Returns the slack and the final x of the last relay, m.
 fn ending<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,
@@ -224,7 +221,7 @@ impl<const RELAYS: usize> Cells<RELAYS> {
         chain.mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index` with room for later relays, m.
+    /// Returns the largest x with room for later relays, m.
     pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
         let first = chain.distance_m() - steps.clone().sum::<f32>();

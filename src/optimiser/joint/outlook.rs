@@ -12,24 +12,23 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function: the slack as a quadratic in one relay's position. Relays toward Rx react optimally.
+/// Value function: the slack as a quadratic in a position. Later relays react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// First derivatives of the slack by x, y and h, m/m.
+    /// First derivatives of the slack by x, y, h, m/m.
     pub(crate) slope: Triple,
-    /// Second derivatives of the slack by x, y and h, 1/m; symmetric.
+    /// Second derivatives of the slack by x, y, h, 1/m.
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack by ln(target SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of the moves' slack, `a f + b f^2`, m. f is the fraction, 0 to 1, of the moves from here to Rx.
+    /// Coefficient a of the moves' slack `a f + b f^2`, m. f is the fraction of the moves, 0 to 1.
     pub(crate) linear: f32,
-    /// Coefficient b of the moves' slack, `a f + b f^2`, m.
+    /// Coefficient b of the moves' slack `a f + b f^2`, m.
     pub(crate) square: f32,
 }
 
 impl Outlook {
-    /// Returns the slack and its derivatives; `at` is the last relay. Slack: `reach_m` minus the last hop's length, m.
-    /// Rx is at `distance_m`; an x beyond it counts as Rx's.
+    /// Returns the slack, `reach_m` minus the last hop's length, and its derivatives. An x beyond Rx counts as Rx's.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -52,8 +51,7 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty `weight near^2 / 2` for closeness to the interferer. `near` is the missing squared
-    /// distance, m^2. Then come its derivatives by position and ln(target SIR).
+    /// Subtracts the penalty `weight near^2 / 2`. `near` is the missing squared distance from the interferer, m^2.
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -67,8 +65,8 @@ impl Outlook {
         }
     }
 
-    /// Replaces the receiver's value function by the sender's; returns the receiver's move. The move is within [`low`,
-    /// `high`], m, relative to now. The coordinate `axis` follows from the hop's maximum length.
+    /// Changes to the sender's value function; returns the receiver's move. It is within [`low`, `high`], m, relative
+    /// to now.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -147,16 +145,15 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     sum
 }
 
-/// Move of a relay in two coordinates, in one iteration. The third follows from the hop's maximum length. The move is
-/// linear in that of the sender.
+/// Move of a relay in two coordinates; the third follows. It is linear in the sender's move.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
     /// True to select the larger solution for the third coordinate.
     pub(super) rising: bool,
-    /// Move in the two free coordinates if the sender stays, m.
+    /// Move if the sender stays, m.
     pub(super) step: [f32; 2],
-    /// Change of the move per metre of the sender's x, y and h.
+    /// Change of the move per metre of the sender's.
     pub(super) follow: [Triple; 2],
 }
 
@@ -164,8 +161,8 @@ pub(crate) struct Policy {
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// Returns the move that maximises a quadratic in two coordinates. It is within [`low`, `high`], m. `slope` is the
-    /// gradient; `bend` (yy, yh, hh) is made concave. `across` has the mixed derivatives with the sender's position.
+    /// Returns the best move within [`low`, `high`], m. `bend` (yy, yh, hh) is made concave. `across` has the mixed
+    /// derivatives with the sender.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],
@@ -226,7 +223,6 @@ impl Policy {
     }
 
     /// Returns the move in the two free coordinates, m. It is `share` of the own step, plus the reaction to `change`.
-    /// `change` is the previous relay's move in x, y and h, m.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;
@@ -297,7 +293,7 @@ impl Brief {
     }
 }
 
-/// Returns the upper half of a finite f32; `widened` restores it. It keeps three decimal digits.
+/// Returns the upper half of an f32: three decimal digits.
 pub(super) const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

@@ -13,13 +13,13 @@ use crate::place::{CrossSection, Placement};
 use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
-/// Used fraction of a hop's squared maximum length; the rest covers rounding.
+/// Used part of a hop's squared maximum length; covers rounding.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation: rounding cannot violate the true one.
+/// Factor on the minimum separation; covers rounding.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Number of Newton steps for a hop with noise (see [`Tangent`]).
+/// Newton steps for a hop with noise (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
 /// Number of bisection steps of [`Site::halved`].
@@ -29,7 +29,7 @@ const HALVINGS: u8 = 12;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
-    /// Noise divided by the interferer's power received at 1 m, 1/m^2.
+    /// Noise divided by the interferer's power at 1 m, 1/m^2.
     pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,
@@ -39,7 +39,7 @@ pub(crate) struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    /// Creates the relay to be placed in `room`. `first` is true if `sender` is Tx.
+    /// Creates the relay to be placed; `first` if `sender` is Tx.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -67,8 +67,8 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position of largest x that meets `target`. Lateral offset and altitude are `wanted`, or the closest
-    /// within reach. The sender is at x = `from_m`. `None` if no hop meets the target.
+    /// Returns the position of largest x that meets `target`, if any. It is at `wanted`, or as close as the hop
+    /// reaches.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -79,8 +79,7 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the position of largest x that meets `target` at `at`. `None` if there is none. The sender is at x =
-    /// `from_m`.
+    /// Returns the largest x that meets `target` at `at`, if any.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -92,10 +91,9 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns the lateral offset and altitude closest to `wanted` within the hop's reach. The hop must not end before
-    /// its sender. `None` if no permitted position is reached. The search is straight, from the permitted position
-    /// nearest the reachable middle. Reachable positions for `c = target / gain > 1`: a ball. Its centre is `p + (p -
-    /// m) / (c - 1)`, its radius `sqrt(c) |p - m| / (c - 1)`. The sender is at p, the interferer at m.
+    /// Returns what the hop reaches closest to `wanted`, not before the sender. `None` if nothing permitted is reached.
+    /// The search is straight, from near the middle of the reach. With `c = target / gain > 1` the reach is a ball:
+    /// centre `p + (p - m) / (c - 1)`, radius `sqrt(c) |p - m| / (c - 1)`, sender p, interferer m.
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -108,8 +106,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle that the hop reaches at x >= `x_m`. Its plane is lateral offset and altitude. The result is
-    /// its centre and squared radius, m^2. `None` if `c = target / gain` is at most 1: no such limit.
+    /// Returns the circle that the hop reaches at x >= `x_m`. It is centre and squared radius, m^2; `None` if `c` is at
+    /// most 1: no limit.
     fn disk(
         &self,
         target: f32,
@@ -160,8 +158,7 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest reachable position toward `wanted`, by bisection. The search is straight, from the sender's
-    /// lateral offset and altitude.
+    /// Returns the farthest reachable position toward `wanted`, by bisection.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -177,8 +174,8 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Returns the new lateral offset and altitude after the fraction `share` of a move. The sender has moved by
-    /// `change` to `from`; the relay is at `nominal`. The hop has to meet `target`.
+    /// Returns the wanted lateral offset and altitude after a move. `share` is the part of the move; the sender has
+    /// moved by `change`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -223,8 +220,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the third coordinate at which the hop just meets `target`, m. `at` are the two free coordinates;
-    /// `policy` states which two. `None` without a solution.
+    /// Returns the third coordinate that just meets `target`, m. `at` are the other two, as chosen by `policy`.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {
@@ -253,8 +249,7 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Returns the first coordinate of the hop's end at maximum length, m. `a` and `b` are its other coordinates. `rising`
-/// selects the larger of two solutions; `None` without any.
+/// Returns the first coordinate at the hop's maximum length, m. `rising` selects the larger of two solutions.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -280,8 +275,8 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point where the line from `best` to `wanted` leaves a circle. `None` if `best` is outside. `middle` is
-/// its centre, `rim` its squared radius, m^2.
+/// Returns where the line from `best` to `wanted` leaves a circle. `None` if `best` is outside. `rim` is the squared
+/// radius, m^2.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -305,7 +300,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude: three bytes each, as fractions of their ranges.
+/// Stored lateral offset and altitude, three bytes each.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
@@ -418,16 +413,15 @@ impl Room {
     }
 }
 
-/// Factor that leaves the first and last relay a choice of position.
+/// Factor that leaves the end relays a choice of position.
 const LITTLE: f32 = 0.999_97;
 
-/// Number of bisection steps for the best first hop with noise.
+/// Bisection steps for the best first hop with noise.
 const END_HALVINGS: u8 = 24;
 
-/// Returns the maximum SIR of the first hop, less the margin [`LITTLE`]. The best relay is opposite the interferer, at
-/// t times its distance from Tx. U and B are the squared distances Tx to interferer along that direction and
-/// perpendicular to it; h is the altitude, nu the noise. The slope of the SIR has the sign of `h^2 - t (B + U) - t^2 U
-/// - nu t s^2`, with `s = B + (1 + t)^2 U + h^2`. It falls with t, so there is one optimum.
+/// Returns the maximum SIR of the first hop, times [`LITTLE`]. The best relay is opposite the interferer, at t times
+/// its distance from Tx. The slope has the sign of `h^2 - t (B + U) - t^2 U - nu t s^2`, `s = B + (1 + t)^2 U + h^2`;
+/// it falls with t. U and B are the squared distances Tx to interferer, along and across that direction.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -453,7 +447,7 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// Returns the maximum SIR of the hop to Rx, less a margin. The relay has `power_w` watts and stays in `room`.
+/// Returns the maximum SIR of the hop to Rx, less a margin.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
         .nearest(CrossSection::default())
@@ -461,20 +455,19 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Weight of a violated minimum separation, in units of the Tx-Rx distance. No increase of slack outweighs it.
+/// Weight of a violated separation, in Tx-Rx distances. No increase of slack outweighs it.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance within which a relay counts as at its limit, in units of the Tx-Rx distance.
+/// Distance that counts as at a limit, in Tx-Rx distances.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference up to which a hop's squared length counts as maximum. It is for hops that end at Rx's x.
+/// Relative difference up to which a length counts as maximum. For hops that end at Rx's x.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the penalty terms of a relay that may be too near the interferer. They are the missing squared distance,
-    /// m^2, 0 if far enough; its weight; its derivative by ln(target SIR). `c` is the target SIR divided by the
-    /// sender's gain. A hop p to p' near the interferer m is short. It is too short if `|p' - p|^2 = q(|p' - m|^2) / c
-    /// < d_min^2`. That is `|p' - m|^2 < L / (1 - nu L)` with `L = c d_min^2`.
+    /// Returns the penalty terms of a relay too near the interferer. Missing squared distance, m^2, 0 if far enough;
+    /// weight; derivative by ln(target). A hop p to p' near the interferer m is too short if
+    /// `|p' - p|^2 = q(|p' - m|^2) / c < d_min^2`. That is `|p' - m|^2 < L / (1 - nu L)`, `L = c d_min^2`.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
@@ -489,15 +482,14 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty for a relay too near the interferer, m. It reduces the chain's slack; 0 if far enough away.
+    /// Returns the penalty near the interferer, m; reduces the slack.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
     }
 
-    /// Computes the move (policy) of the relay at `to`. `outlook` changes from the relay's value function to its
-    /// sender's. The move is at most `trust` times the distance from the interferer. Work: some 400 multiplications and
-    /// two square roots.
+    /// Computes the relay's move, and its sender's value function. The move is at most `trust` times the distance from
+    /// the interferer.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -551,9 +543,7 @@ impl Site<'_> {
         }
     }
 
-    /// Selects the coordinate of the hop's end that follows from the others. It is the one within its limits with which
-    /// F changes most; x is preferred. The second result is dF by this coordinate. F is half the hop's margin to its
-    /// target (see `hop`).
+    /// Selects the dependent coordinate, within its limits, and dF by it. F is half the hop's margin (see `hop`).
     fn axis(
         &self,
         c: f32,

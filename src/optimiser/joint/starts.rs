@@ -14,24 +14,21 @@ use crate::sir::square;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
-    /// Parabola from Tx to Rx. `aside` and `up` are its middle's lateral offset and height, in half Tx-Rx distances.
+    /// Parabola: lateral offset and height of its middle, in half Tx-Rx distances.
     Arch { aside: f32, up: f32 },
-    /// Spiral about the interferer, through a point P above or beside it. `aside` and `up` are the direction from the
-    /// interferer to P. `far` is P's distance divided by the geometric mean of those of Tx and Rx.
+    /// Spiral about the interferer through a point in direction (`aside`, `up`). `far` is its distance, relative to Tx
+    /// and Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Parabola as for `Arch`, but without a minimum separation. Hops are as in flight, and relays may stay short of
-    /// their farthest positions.
+    /// Parabola without a separation. Hops are as in flight.
     Through { aside: f32, up: f32 },
-    /// Parabola, seen from above, for relays with fixed altitudes. `aside` is its middle's lateral offset, in half
-    /// Tx-Rx distances. Other altitudes are interpolated. Beyond the outermost fixed relay they stay if `level`, else
-    /// fall to the lowest.
+    /// Parabola, seen from above, through the fixed altitudes. Outside them altitudes stay if `level`, else fall to the
+    /// lowest.
     FixedAltitudes { aside: f32, level: bool },
-    /// Zigzag, for relays that do not fit one behind the other. They alternate between a corner of their range and a
-    /// place one separation beside it. The corner is highest and away from the interferer.
+    /// Zigzag at the highest corner away from the interferer. For relays that do not fit one behind the other.
     Turns,
-    /// Chain at the lowest altitude, for a very high target. No hop can then get around the interferer.
+    /// Chain at the lowest altitude, for a very high target.
     Near,
-    /// Relay 1 at Rx's x, high above or far beside it. The others lead down to the line Tx-Rx in equal steps.
+    /// Relay 1 at Rx's x, high or far beside it. The others lead down to the line in equal steps.
     Far,
 }
 
@@ -72,11 +69,11 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral: the logarithm of its radius is linear in the angle.
+/// Spiral: ln(radius) is linear in the angle.
 struct Way {
     to: Triple,
     angle: f32,
-    /// Logarithm of the radius at the end, minus that at the start.
+    /// Change of ln(radius) from start to end.
     rise: f32,
     length: f32,
 }
@@ -98,8 +95,8 @@ impl Way {
         }
     }
 
-    /// Returns the end of a hop along the spiral from `here`. Points are relative to the interferer. The hop's length
-    /// is `step` times its end's radius.
+    /// Returns the end of a hop along the spiral, relative to the interferer. Its length is `step` times its end's
+    /// radius.
     fn after(&self, here: Triple, step: f32) -> Triple {
         let bend = 0.5 * step * self.rise / self.length;
         let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
@@ -114,7 +111,7 @@ impl Way {
     }
 }
 
-/// Minimum divisor for a spiral, which prevents a division by 0.
+/// Minimum divisor, against a division by 0.
 const SHORTEST: f32 = 1e-6;
 
 /// Maximum tangent of a hop's angle about the interferer.
@@ -125,8 +122,7 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the lateral offset and altitude of a relay on a spiral. The hop comes from `from`; `c`, target / gain,
-    /// gives its length.
+    /// Returns a relay's lateral offset and altitude on a spiral. `c`, target / gain, gives the hop's length.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -159,8 +155,7 @@ impl Start {
         })
     }
 
-    /// Returns the lateral offset and altitude of relay `index` in a zigzag. Neighbours differ by `apart_m` in the
-    /// lateral offset.
+    /// Returns relay `index`'s lateral offset and altitude in a zigzag.
     pub(super) fn in_turn(
         index: u16,
         interferer: &Interferer,
@@ -185,7 +180,7 @@ impl Start {
         })
     }
 
-    /// Returns the initial chain `number` for `room`. `None` past the last; `Some(None)` if it does not fit.
+    /// Returns initial chain `number`; `Some(None)` if it does not fit. `None` past the last.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -227,7 +222,7 @@ impl Start {
         }
     }
 
-    /// Returns a relay's lateral offset and altitude in this initial chain. The previous relay is at `x_m`.
+    /// Returns a relay's lateral offset and altitude in this chain.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
             Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
@@ -246,7 +241,7 @@ impl Start {
 /// Bisection for the highest feasible target, in ln(SIR).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest feasible target so far, in ln(SIR). True if some relays must stay short of their farthest x.
+    /// Highest feasible target, ln(SIR); true if relays must stay short.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -256,8 +251,7 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward from `sigma` to the precision `width`, in ln(SIR). The first step is `step`; each next
-    /// is `growth` times longer.
+    /// Creates a search downward to the precision `width`, in ln(SIR). Each step is `growth` times the last.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -269,8 +263,7 @@ impl Seek {
         }
     }
 
-    /// Creates a search upward from the feasible `sigma` to the precision `width`. The first step is `step`, in
-    /// ln(SIR); each next is three times longer. `holds_back`: some relays must stay short of their farthest positions.
+    /// Creates a search upward to the precision `width`, in ln(SIR). Each step is three times the last.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -282,8 +275,8 @@ impl Seek {
         }
     }
 
-    /// Records a tried target; true if another has to be tried. `met` is `None` if infeasible. It is true if some
-    /// relays must stay short.
+    /// Records a tried target; true if another has to be tried. `met`: `None` if infeasible, true if some relays must
+    /// stay short.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -309,8 +302,7 @@ impl Seek {
         true
     }
 
-    /// Returns the highest feasible target, ln(SIR); `None` without any. True if some relays must stay short of their
-    /// farthest positions.
+    /// Returns the highest feasible target, ln(SIR), if any. True if some relays must stay short.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }

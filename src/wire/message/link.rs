@@ -23,46 +23,45 @@ pub struct Hello {
     pub neighbour: u16,
     /// True if the sender requests a hello.
     pub requests_reply: bool,
-    /// True if the sender requests a new view (members of the chain).
+    /// True if the sender requests a new view (members).
     pub requests_view: bool,
     /// True if the sender has restarted and joined nothing yet.
     pub fresh: bool,
     /// Readiness of sender or destination.
     ///
-    /// - Both in the chain: the sender fits between the destination and its neighbour there.
-    /// - Sender outside the chain: it would join when called.
-    /// - Destination outside the chain: it is called to join.
+    /// - Both in the chain: the sender fits in beside the destination.
+    /// - Sender outside: it would join.
+    /// - Destination outside: it is called to join.
     pub ready: bool,
-    /// Number of relays from the sender on, away from the destination: 1 to 1000.
+    /// Number of relays from the sender on: 1 to 1000.
     pub behind: u16,
-    /// Nodes that the sender receives toward the destination. Bit i, 0 to 3: its number differs from the sender's by i
-    /// + 1.
+    /// Nodes that the sender receives toward the destination. Bit i: number differs by i + 1.
     pub hears: u8,
     /// Newest mission of the sender, loaded or uploaded.
     pub latest_mission: MissionId,
     /// True if the sender uses `latest_mission` now.
     pub active: bool,
-    /// True if all relays of the view use the uploaded `latest_mission`.
+    /// True if all relays of the view use `latest_mission`.
     pub active_in_view: bool,
     /// True if the sender or a relay beyond refuses `latest_mission`.
     pub refused: bool,
     /// Flag for a node outside the chain.
     ///
     /// - With `fresh`: the sender is outside, and no relay selects it.
-    /// - Without: the destination is outside. A view without it is agreed, and its relays are in place.
+    /// - Without: the destination is outside an agreed view that is in place.
     pub outside: bool,
-    /// Nonce that a mission offer must repeat; 0 to accept none.
+    /// Nonce for a mission offer; 0 to accept none.
     pub offer_number: u16,
 }
 
 impl Hello {
-    /// Returns true if the sender `by` receives node `of`. False beyond four numbers.
+    /// Returns true if `by` receives `of`, within four numbers.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes into `buffer`; returns the length, `None` if it does not fit. The eight flags share one byte.
+    /// Encodes into `buffer`; returns the length, if it fits.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [
             self.requests_reply,
@@ -125,22 +124,22 @@ impl Hello {
     }
 }
 
-/// Claim of a node to its number, or another's echo. Two nodes with the same number detect each other by it.
+/// Claim of a node to its number, or another's echo. It detects two nodes with the same number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number; the larger of two wins. Drawn at start; raised at most once while active.
+    /// Random claim number; the larger wins. Raised at most once while active.
     pub number: u32,
-    /// Last other claim to the same node number; 0 for none.
+    /// Other claim to the same number; 0 for none.
     pub other_number: u32,
     /// True if the node is passive: another uses its number.
     pub passive: bool,
-    /// True for an echo of a claim to the destination's number. Both nodes with this number receive it.
+    /// True for an echo of a claim to the destination's number.
     pub echo: bool,
 }
 
 impl Claim {
-    /// Encodes into `buffer`; returns the length, `None` if it does not fit. Flags from bit 0: passive, echo.
+    /// Encodes into `buffer`; returns the length, if it fits. Flags from bit 0: passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
         let numbers = [self.number, self.other_number].map(u32::to_le_bytes);
@@ -159,7 +158,7 @@ impl Claim {
     }
 }
 
-/// Encodes a limit of x between neighbours (fence); returns the length. `None` if it does not fit.
+/// Encodes a limit of x (fence); returns the length, if it fits.
 pub(super) fn encode_fence(line_digest: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, line_digest);
     let numbers = [fence.echo, fence.number].map(Word::new);

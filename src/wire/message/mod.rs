@@ -32,7 +32,7 @@ const SWEEP: usize = 88;
 /// Maximum length of a body except a mission offer, bytes.
 const LONG: usize = if SENSING { round::HEARD } else { SWEEP };
 
-/// Maximum length of a body, bytes. The longest is a mission offer; without `upload` a sensing message or a sweep.
+/// Maximum length of a body, bytes: a mission offer, if possible.
 pub const MAX_BODY: usize = if Upload::OFFER > LONG {
     Upload::OFFER
 } else {
@@ -53,59 +53,57 @@ impl Upload {
     }
 }
 
-/// Message between neighbours. A *pass* travels along the chain once; its result travels back. *Onward* is a pass's
-/// direction: toward Rx, in an interference field toward Tx.
+/// Message between neighbours. A *pass* goes along the chain once; its result comes back. *Onward* is its direction.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// To the next relay: target SIRs and the sender's farthest x.
+    /// Target SIRs and farthest x, for the next relay.
     Sweep(Sweep),
     /// Reply to target SIRs: the result for each.
     Verdict(SweepVerdict),
     /// Reply to a repeated message: there is no result yet.
     Busy {
-        /// Number of the message, or a hash of the proposed view.
+        /// Number of the message, or the view's hash.
         number: u16,
     },
     /// Heartbeat request, reply, or both, in either direction.
     Heartbeat {
-        /// Digest of the mission loaded before flight. It reveals a wrong configuration before take-off.
+        /// Digest of the mission loaded before flight.
         mission: u16,
         /// Number of the own request, 0 for none.
         request: u16,
         /// Number of the answered request, 0 for none.
         reply: u16,
     },
-    /// To the next relay: altitudes and powers so far.
+    /// Altitudes and powers so far, for the next relay.
     Gather(Roster),
     /// Reply to `Gather`: altitudes and powers of all relays.
     Gathered(Roster),
-    /// To the next relay: interference estimate, and measurements so far.
+    /// Interference estimate and measurements so far, for the next relay.
     Sense(Heard),
     /// Reply to `Sense`: measurements of the sender and later relays.
     Sensed(Heard),
-    /// To the next relay: token of Algorithm 2, whose holder moves.
+    /// Token of Algorithm 2, for the next relay.
     Token(Token),
-    /// Reply to a token: the sender's position, and the worst SIR after it.
+    /// Reply to a token: position, and the worst later SIR.
     Moved(Moved),
-    /// To the next relay: lease renewal by the leader.
+    /// Lease renewal by the leader, for the next relay.
     Pulse(Pulse),
     /// Reply to a lease renewal.
     Pulsed(Pulsed),
-    /// Neighbours and view of the sender, in either direction. Also to nodes that are not neighbours.
+    /// Neighbours and view of the sender, in either direction.
     Hello(Hello),
-    /// To the next relay: proposed view (members), with votes so far.
+    /// Proposed view with votes, for the next relay.
     Proposal(Proposal),
     /// Reply to a proposed view: the decision.
     Decision(Decision),
     /// Limit of x (fence) between two neighbours, in either direction.
     Fence {
-        /// Digest that is equal if both have the same x axis. It covers the loaded mission, and uploaded Tx and Rx
-        /// positions.
+        /// Digest that is equal if the x axes are. It covers the loaded mission, and uploaded Tx and Rx positions.
         line_digest: u16,
         /// Limit of x, x of the agreed position, and flags.
         fence: Fence,
     },
-    /// Newer mission than the destination's, in either direction or from the ground.
+    /// Newer mission than the destination's.
     Offer {
         /// Offered mission.
         upload: Upload,
@@ -116,12 +114,12 @@ pub enum Message {
     Level {
         /// Digest of the mission that the sender loaded before flight.
         mission: u16,
-        /// Mean interference power, W: 1e-30 to 1e6. It includes the receiver's noise.
+        /// Mean interference power with noise, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Claim to the own node number, or another's echo, in either direction.
+    /// Claim to the own node number, or another's echo.
     Claim(Claim),
-    /// Request for all relays' reports, forwarded away from the ground station.
+    /// Request for all relays' reports, away from the ground station.
     Watch {
         /// Number of the request, wrapping; it rises every five seconds.
         number: u16,
@@ -133,7 +131,7 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest of the mission, view or x axis, if any. It shows if both nodes have the same.
+    /// Returns the digest of the mission, view or x axis.
     pub fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -160,7 +158,7 @@ impl Message {
         }
     }
 
-    /// Returns true if the digest is that of mission and view.
+    /// Returns true for the digest of mission and view.
     pub(crate) const fn belongs_to_view(&self) -> bool {
         matches!(
             self,
@@ -177,7 +175,7 @@ impl Message {
         )
     }
 
-    /// Returns true if the digest is that of the proposed mission.
+    /// Returns true for the digest of the proposed mission.
     pub(crate) const fn is_view_change(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
@@ -197,8 +195,8 @@ impl Message {
 }
 
 impl Message {
-    /// Encodes the body into `buffer`; returns its length, at most [`MAX_BODY`]. `None` if it does not fit, or the
-    /// crate lacks its feature.
+    /// Encodes into `buffer`; returns the length, at most [`MAX_BODY`]. `None` if it does not fit, or its feature is
+    /// missing.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         match self {
             // Messages of a missing feature are never sent.
@@ -243,11 +241,11 @@ impl Message {
         }
     }
 
-    /// Decodes a message and checks all ranges. Work linear in the length, at most [`MAX_BODY`].
+    /// Decodes a message and checks all ranges.
     ///
     /// # Errors
-    /// [`MessageError::Encoding`] unless the bytes are one message in its shortest form. [`MessageError::Value`] if a
-    /// number is out of range, or the feature is missing.
+    /// [`MessageError::Encoding`] unless it is one message in its shortest form. [`MessageError::Value`] for a number
+    /// out of range.
     #[inline(never)]
     pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
         let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;

@@ -59,11 +59,11 @@ struct OfferBody {
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// Ratio r (SIR needed back to Tx / to Rx), and power of Rx, W.
+    /// Ratio r, and transmit power of Rx, W.
     back: [f32; 2],
     /// SNR gap of fitted time slots; 0 for equal slots.
     fitted_gap: f32,
-    /// Tx and Rx by [`Sites::to_bytes`]; all 0 if the upload has none.
+    /// Positions of Tx and Rx; all 0 if none.
     sites: SitesBody,
 }
 

@@ -56,7 +56,7 @@ impl Serialize for Word {
     }
 }
 
-/// Encodes `body` into `buffer`; returns the length, `None` if it does not fit.
+/// Encodes `body` into `buffer`; returns the length, if it fits.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
     postcard::to_slice(body, buffer)
         .ok()
@@ -75,8 +75,8 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Decodes one number per target; returns them and the remaining bytes. The count must have its shortest form. Postcard
-/// accepts longer ones, depending on `usize`: nodes could differ.
+/// Decodes one number per target; returns the rest, too. The count must be shortest: postcard's limit depends on
+/// `usize`.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -87,7 +87,7 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum of x values and slacks in a message, m. A position (at most 1e6 m) plus the last hop (at most 1e9 m) fits.
+/// Maximum of x values and slacks, m. A position (1e6 m) plus the last hop (1e9 m) fits.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -117,10 +117,10 @@ pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
 
-/// Returns the position at `x_m`, `altitude_m` and y = 0.
+/// Returns the position at y = 0.
 ///
 /// # Errors
-/// [`MessageError::Value`] if one of the three numbers is out of range.
+/// [`MessageError::Value`] if a number is out of range.
 pub(super) fn checked_place(
     [x_m, altitude_m]: [f32; 2],
     power_w: f32,
@@ -130,7 +130,7 @@ pub(super) fn checked_place(
     Ok(place)
 }
 
-/// Checks a condition on a message's numbers.
+/// Checks a condition.
 ///
 /// # Errors
 /// [`MessageError::Value`] if the condition is false.

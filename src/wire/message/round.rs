@@ -18,8 +18,7 @@ use crate::wire::message::parts::{
     require, tag, take, take_targets, write,
 };
 
-/// Target SIRs, and the farthest x at which the sender meets each. Farthest is in the message's direction along the
-/// chain.
+/// Target SIRs, and the farthest x that meets each.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the target list, rising and wrapping.
@@ -30,21 +29,19 @@ pub struct Sweep {
     pub ladder: Ladder,
     /// Lateral offset, altitude and power of the sender.
     pub relay: Station,
-    /// True for the joint method's lateral offsets and altitudes. False for the configured ones.
+    /// True for the joint method's offsets and altitudes.
     pub chosen: bool,
-    /// Measured Upsilon (mean of 1 / I) at the sender, 1/W. I is the interference power. `None` to use the mission's
-    /// field.
+    /// Measured Upsilon (mean of 1 / I) at the sender, 1/W.
     pub measured_per_w: Option<f32>,
-    /// Farthest x at which the sender meets each target, m. Lowest target first; it ends before the first missed one.
+    /// Farthest x per target, m, lowest target first. It ends before the first missed target.
     pub reaches: PerTarget,
 }
 
-/// Fields at the start of all sweeps; the farthest x follow.
+/// Start of all sweeps; the farthest x follow.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower middle target, or the only one; negative for a plain sweep. In a plain one every relay takes its farthest
-    /// x.
+    /// Lower middle target, or the only one; negative if plain.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -71,8 +68,7 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes into `buffer`; returns the length, `None` if it does not fit. Upsilon or the lateral offset is after the
-    /// head.
+    /// Encodes into `buffer`; returns the length, if it fits.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -137,9 +133,9 @@ pub struct SweepVerdict {
     pub view_digest: u16,
     /// Slack for each target, and the committed target.
     pub verdict: Verdict,
-    /// x that the destination must take after a commit, m. `None` for its reported farthest x.
+    /// x that the destination must take, m. `None` for its farthest x.
     pub required_x_m: Option<f32>,
-    /// True if a relay from the sender on has an own power or altitude.
+    /// True if some relay has an own power or altitude.
     pub own: bool,
 }
 
@@ -178,10 +174,10 @@ impl SweepVerdict {
 /// Maximum number of profiles in one message.
 pub const MOST_NAMED: usize = 8;
 
-/// Altitude and power of a relay, if not the common ones.
+/// Altitude and power of a relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Index of the relay in the view, 1 next to Tx.
+    /// Index in the view, 1 next to Tx.
     pub index: u16,
     /// Fixed altitude, m; 0 if the relay chooses it.
     pub held_m: f32,
@@ -192,7 +188,7 @@ pub struct OwnSeat {
 /// Profiles of relays, by rising index.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Profiles of relays: up to the sender, or in the reply of all.
+/// Altitudes and powers of relays. In a reply of all relays.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the collection, rising and wrapping.
@@ -201,11 +197,11 @@ pub struct Roster {
     pub view_digest: u16,
     /// Index of the last relay collected earlier; 0 at first.
     pub after: u16,
-    /// Profiles of relays above `after`. If the list is full, another message collects the rest.
+    /// Profiles of relays above `after`; others follow later.
     pub seats: OwnSeats,
 }
 
-/// Profiles on the wire: index, altitude, m (0 if chosen), power, W.
+/// Profiles: index, altitude, m (0 if chosen), power, W.
 type SeatsBody = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
@@ -248,7 +244,7 @@ impl Roster {
     }
 }
 
-/// Token of Algorithm 2: relays improve their positions one by one.
+/// Token of Algorithm 2, which moves relays one by one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
     /// Number of the token, rising and wrapping.
@@ -261,7 +257,7 @@ pub struct Token {
     pub power_w: f32,
     /// Action of each relay that gets the token.
     pub turn: AdjustStep,
-    /// SIR of the worst hop before this token, linear; 0 if unknown.
+    /// SIR of the worst hop before, linear; 0 if unknown.
     pub sir: f32,
 }
 
@@ -290,7 +286,7 @@ impl Token {
     }
 }
 
-/// Action of a relay that gets the token of Algorithm 2.
+/// Action of a relay that gets the token.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
@@ -307,7 +303,7 @@ pub enum AdjustStep {
     Stop,
 }
 
-/// Action on the wire: kind and three numbers; unused ones are 0.
+/// Action: kind and three numbers; unused ones are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct StepBody {
     kind: u8,
@@ -338,7 +334,7 @@ impl StepBody {
         }
     }
 
-    /// Returns the action; `None` if a number is invalid. Unused numbers must be 0.
+    /// Returns the action; `None` if a number is invalid.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
@@ -406,11 +402,10 @@ fn is_sir(sir: f32) -> bool {
     (0.0..=f32::MAX).contains(&sir)
 }
 
-/// Length of a sensing message's body, bytes. Tag, number, estimate, sums, level at Rx, excluded node.
+/// Length of a sensing message's body, bytes.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: interference estimate, and sums of measurements. The sums are up to the sender; in replies from the
-/// sender on.
+/// Interference estimate, and sums of measurements. Sums of relays up to the sender; in replies from it on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the message, rising and wrapping.
@@ -423,11 +418,11 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at Rx.
     pub receiver: Level,
-    /// Node whose measurements contradict the others; 0 for none. They are left out of `sums`. Set in replies only.
+    /// Node whose measurements contradict the others; 0 for none. Set in replies only.
     pub excluded: u16,
 }
 
-/// Estimate on the wire: number, kind, four values; unused ones are 0.
+/// Estimate: number, kind, four values; unused ones are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct EstimateBody {
     number: Word,

@@ -7,11 +7,11 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, take, write};
 
-/// Proposal of a new view (members of the chain), with votes. It goes from relay to relay.
+/// Proposal of a new view (members), with votes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
-    /// Identifier of the new mission, which all relays so far have stored.
+    /// Identifier of the mission, stored by all relays so far.
     pub mission_id: MissionId,
     /// Identifier of the proposed view, later than all known ones.
     pub proposed_view: ViewId,
@@ -21,7 +21,7 @@ pub struct Proposal {
     pub poll: Poll,
 }
 
-/// Votes on a proposal so far, and remaining leases of earlier views. Every reached relay adds its vote.
+/// Votes on a proposal, and remaining leases of earlier views.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
@@ -29,15 +29,13 @@ pub struct Poll {
     pub agreed: View,
     /// Number of votes by members of `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of `agreed` has voted. For the initial view the leader counts as proposer. Exactly half of
-    /// the votes are then a quorum.
+    /// True if the proposer of `agreed` (or the leader) has voted. Half of the votes are then a quorum.
     pub proposer: bool,
-    /// Longest remaining lease of members without a vote, in 0.1 s.
+    /// Longest remaining lease without a vote, in 0.1 s.
     pub lease_left: u16,
-    /// Time until leases of views before `agreed` expire, in 0.1 s. 65535 if unknown. The new view must not be used
-    /// earlier.
+    /// Time until earlier views' leases expire, in 0.1 s; 65535 if unknown. The new view must not be used earlier.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a voting member has accepted. It may be agreed on already.
+    /// Latest view accepted after `agreed`; perhaps agreed on already.
     pub successor: Option<Successor>,
 }
 
@@ -55,7 +53,7 @@ impl Poll {
     }
 }
 
-/// View accepted in an earlier decision; it may be agreed on already.
+/// View accepted earlier; perhaps agreed on already.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
@@ -73,16 +71,15 @@ pub struct Decision {
     pub mission_id: MissionId,
     /// Identifier of the proposed view.
     pub proposed_view: ViewId,
-    /// Number of relays from the proposer to the sender: 1 to 1000.
+    /// Number of relays up to the sender: 1 to 1000.
     pub place: u16,
     /// Number of relays reached: 1 to 1000.
     pub reached: u16,
     /// Newest agreed view before this decision.
     pub base: View,
-    /// View to accept; `None` without a quorum. It is the proposed one, or an earlier decided one.
+    /// View to accept; `None` without a quorum.
     pub accepted: Option<View>,
-    /// Time until positions of the accepted view may be used, in 0.1 s. Until then members without a vote may hold a
-    /// lease.
+    /// Time until the accepted view may be used, in 0.1 s. Other members may hold a lease until then.
     pub usable_in: u16,
 }
 
@@ -138,7 +135,7 @@ impl SizedBody {
     }
 }
 
-/// Returns true if this identifier and number of relays are possible.
+/// Returns true if a view can be like this.
 fn is_view(view: View) -> bool {
     (view.id == ViewId::LOADED || view.id.is_proposed()) && is_size(view.relays)
 }
@@ -170,7 +167,7 @@ impl Proposal {
         )
     }
 
-    /// Decodes a proposal; its other views must be earlier than the proposed one.
+    /// Decodes a proposal; its other views must be earlier.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(Word::number);
@@ -260,25 +257,25 @@ impl Decision {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulse {
-    /// Number of the renewal, wrapping. Each follows only after all members took part in the one before.
+    /// Number of the renewal, wrapping; follows a complete one.
     pub number: u16,
     /// Digest of mission and view.
     pub view_digest: u16,
-    /// Duration of the lease, in 0.1 s: 1 to 65535. It starts when the member takes part.
+    /// Duration of the lease, in 0.1 s: 1 to 65535.
     pub lease: u16,
     /// Orders to the relays that leave or join.
     pub orders: Orders,
 }
 
-/// Orders of the leader to a leaving and a joining relay. Each lease renewal has them.
+/// Orders of the leader to a leaving and a joining relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
-    /// Node that may leave, 0 for none. Its neighbours then select each other.
+    /// Node that may leave, 0 for none.
     pub leaver: u16,
     /// Node that is called to join, 0 for none.
     pub joiner: u16,
-    /// True if all relays were at their positions at the last renewal.
+    /// True if all relays were at their positions.
     pub in_place: bool,
 }
 
@@ -290,17 +287,17 @@ impl Orders {
     };
 }
 
-/// Requests to leave or join, from the last relay to the sender.
+/// Requests to leave or join.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
     /// Node that needs to leave most urgently, 0 for none.
     pub leaver: u16,
-    /// Remaining flight time of `leaver`, s. 65535 if unknown; 0 if it is ordered to leave.
+    /// Remaining flight time of `leaver`, s. 65535 if unknown; 0 if ordered to leave.
     pub endurance_s: u16,
     /// Node that would join, 0 for none.
     pub spare: u16,
-    /// True if all relays from the last to the sender are in place.
+    /// True if these relays are at their positions.
     pub in_place: bool,
 }
 
@@ -346,13 +343,13 @@ pub struct Pulsed {
     pub requests: Requests,
 }
 
-/// Common part of a renewal and its reply: one decoder saves flash.
+/// Common part of a renewal and its reply.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct RenewalBody {
     pass: PassId,
     number: Word,
     in_place: bool,
-    /// Leaving node (lower half) and joining node; `None` if both are 0.
+    /// Leaving node (lower half) and joining node.
     nodes: Option<[u8; 4]>,
 }
 
@@ -370,7 +367,7 @@ impl RenewalBody {
     /// Returns the leaving and the joining node, 0 for none.
     ///
     /// # Errors
-    /// [`MessageError::Value`] if a number is above 1000, or if both are 0 but encoded.
+    /// [`MessageError::Value`] above 1000, or for two encoded zeros.
     fn nodes(&self) -> Result<[u16; 2], MessageError> {
         let Some([a, b, c, d]) = self.nodes else {
             return Ok([0; 2]);

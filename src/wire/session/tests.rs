@@ -33,7 +33,7 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// Returns a handshake or a `Busy` message of the session `from`.
+/// Returns a handshake or a `Busy` message.
 fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {
@@ -63,8 +63,7 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Exchanges handshakes until none is pending; returns their number. `ends` are sessions and node numbers, `counters`
-/// the frame counters.
+/// Exchanges handshakes until none is pending; returns their number.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
@@ -118,7 +117,7 @@ fn a_link_is_proven_by_three_handshakes_or_four_if_crossed() {
     }
 }
 
-/// Checks that both nodes prove their presence despite a lost handshake. A node without this proof requests again.
+/// Checks that both nodes prove their presence despite a loss.
 #[test]
 fn one_lost_handshake_leaves_both_ends_proven() {
     for lost in 0..4 {
@@ -173,7 +172,7 @@ fn a_handshake_body_contains_the_known_nonces() {
     );
 }
 
-/// Checks that a full table keeps the pinned and newest entries. Recordings of a forgotten node are rejected.
+/// Checks that a full table keeps pinned and newest entries. Recordings of a forgotten node are rejected.
 #[test]
 fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     let mut own = session();
@@ -244,7 +243,7 @@ fn recorded_handshakes_do_not_replace_known_nodes() {
     }
 }
 
-/// Checks that `greet` restores a session after a restart. Before, the restarted node cannot verify any frame.
+/// Checks that `greet` restores a session after a restart.
 #[test]
 fn a_handshake_repairs_a_link_known_at_one_end() {
     let mut own = session();
@@ -293,7 +292,7 @@ fn after_the_last_nonce_no_new_node_is_accepted() {
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
 
-/// Checks that an older or reused epoch is reported once. Replays are not reported.
+/// Checks that an old epoch is reported once, replays never.
 #[test]
 fn an_epoch_that_went_back_is_reported_once_a_replay_never() {
     for epoch in [1, 7] {
@@ -331,8 +330,7 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks which frames reveal another node of this relay's number. Only a handshake with the same key and no older
-/// epoch does.
+/// Checks which frames reveal a node of the same number. Only those with the same key and no older epoch.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -376,7 +374,7 @@ fn own_frames_are_recognised() {
     }
 }
 
-/// Checks that two nodes with the same number are detected. The node with the smaller claim learns the larger one.
+/// Checks that two nodes with the same number are detected.
 #[test]
 fn the_smaller_claim_receives_the_larger_one() {
     const FAR: u32 = 1 << 20;
@@ -420,7 +418,7 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks when the node with the smaller claim is accepted. The other must be silent; its recordings are then rejected.
+/// Checks that the smaller claim wins once the larger is silent.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

@@ -21,11 +21,10 @@
 use super::super::chain::{Chain, Gains, SeatOf};
 use super::super::hop::{Triple, minus};
 
-/// Amount added to a squared length, in units of the squared Tx-Rx distance: its logarithm stays finite.
+/// Amount added to a squared length: its logarithm stays finite.
 const SHORTEST: f32 = 1e-8;
 
-/// Levels of a hop: `ln(forward SIR)` and `ln(backward SIR / r)`. All pairs have this order. The *slack* of a level is
-/// the level minus the target.
+/// Levels of a hop: `ln(forward SIR)` and `ln(backward SIR / r)`. *Slack*: the level minus the target.
 pub(super) type Levels = [f32; 2];
 
 /// Symmetric 3 x 3 matrix: xx, xy, xh, yy, yh, hh.
@@ -36,7 +35,7 @@ pub(super) fn dot([a, b, c]: &Triple, [x, y, z]: &Triple) -> f32 {
     a * x + b * y + c * z
 }
 
-/// Adds `weight` v v' to `to`, with v = (x, y, h).
+/// Adds `weight` v v' to `to`, v = (x, y, h).
 #[inline(never)]
 pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: &Triple, weight: f32) {
     let (a, b) = (weight * x, weight * y);
@@ -88,7 +87,7 @@ impl LogGains {
         }
     }
 
-    /// Returns both gains of hop `k` as logarithms, the backward one divided by r. `k` is 1 (from Tx) to N + 1 (to Rx).
+    /// Returns hop `k`'s log gains, the backward one divided by r. `k` is 1 (from Tx) to N + 1 (to Rx).
     fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;
@@ -101,15 +100,14 @@ impl LogGains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q at `at`: q is the inverse of interference plus noise. The unit of interference is that received at
-    /// the distance D.
+    /// Returns ln q, q the inverse of interference plus noise.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;
         libm::logf(s / (1.0 + self.gains.noise * s))
     }
 
-    /// Returns the levels of hop `k`. `quiet_from` and `quiet_to` are ln q at its ends.
+    /// Returns the levels of hop `k`. `quiet_...` are ln q at its ends.
     pub(super) fn levels(
         &self,
         k: u16,
@@ -125,8 +123,7 @@ impl LogGains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s [levels](Levels) by its ends. `weights` sums the second derivatives of both
-    /// levels. If `convex`, terms that make the sum indefinite are left out.
+    /// Returns the derivatives of hop `k`'s [levels](Levels) by its ends. If `convex`, indefinite terms are left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -165,8 +162,8 @@ impl LogGains {
         hop
     }
 
-    /// Adds the first derivatives of ln q to `slope`. Adds the second ones, times -`weight`, to `bend`. If `convex`,
-    /// terms that make `bend` indefinite are left out.
+    /// Adds the derivatives of ln q: first to `slope`, second times -`weight` to `bend`. If `convex`, indefinite terms
+    /// are left out.
     fn add_quiet(
         &self,
         at: Triple,
@@ -193,14 +190,13 @@ impl LogGains {
     }
 }
 
-/// Derivatives of a hop's [levels](Levels) by its ends. Second ones (`bend...`) are weighted sums over both levels,
-/// negated.
+/// Derivatives of [levels](Levels) by the ends. Second ones (`bend...`) are negated sums.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {
     pub(super) by_from: [Triple; 2],
     pub(super) by_to: [Triple; 2],
     pub(super) bend_from: Symmetric,
     pub(super) bend_to: Symmetric,
-    /// Part of both `bend_...` from the hop's length. The mixed second derivatives are its negative.
+    /// Part of `bend_...` from the length; the mixed ones negated.
     pub(super) bend: Symmetric,
 }

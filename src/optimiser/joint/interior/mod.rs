@@ -43,20 +43,20 @@ use newton::{Factor, Front, Sums, Weights};
 const FIRST_MU: f32 = 0.03;
 /// First barrier weight for a start near the result.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight: bound on the error in ln(SIR) if concave.
+/// Last barrier weight: bound on the error in ln(SIR).
 const LAST_MU: f32 = 1e-4;
 
 /// Factor by which the barrier weight falls.
 const LESS: f32 = 0.3;
 
-/// Increase of merit / mu that ends a weight after over half a step.
+/// Increase of merit / mu that ends a weight, after half a step.
 const SETTLED: f32 = 0.1;
-/// Increase of merit / mu that ends a weight after any step.
+/// Increase of merit / mu that ends a weight, after any step.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Maximum step toward a limit, as a fraction of the distance.
+/// Maximum step toward a limit, as a fraction.
 const NEAR_BOX: f32 = 0.98;
 /// Factor on a Newton step that lowers the merit.
 const SHORTER: f32 = 0.4;
@@ -67,7 +67,7 @@ const APART: f32 = 5.0;
 
 /// Number of Newton steps for the target per call.
 const STEPS: u8 = 4;
-/// Index of the last Newton step for the target, from 0.
+/// Last Newton step for the target, from 0.
 const TARGETS: u8 = 12;
 /// Relative error that ends the Newton steps for the target.
 const EXACT: f32 = 5e-4;
@@ -79,7 +79,7 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop ([`Levels`]) and their Lagrange multipliers. Each multiplier is the upper half of an f32.
+/// Levels of a hop, and their multipliers as upper halves of f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: Levels,
@@ -93,7 +93,7 @@ impl Hop {
     };
 }
 
-/// x of a relay, in units of the Tx-Rx distance, and the hop to it.
+/// x of a relay, in Tx-Rx distances, and its hop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     x: f32,
@@ -107,18 +107,18 @@ impl Noted for Node {
     }
 }
 
-/// Newton step in x, y and h: upper halves of f32, three digits.
+/// Newton step in x, y and h: upper halves of f32.
 type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
 enum Segment {
     /// Equations of the segment's first relay, with earlier relays eliminated.
     Front(Front),
-    /// Newton steps of the segment's first six and last four relays.
+    /// Newton steps of the first six and last four relays.
     Steps([Step; FIRST], [Step; SECOND]),
 }
 
-/// Position (x, y, h) of a node and its limits, in units of the Tx-Rx distance.
+/// Position of a node and its limits, in Tx-Rx distances.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -145,7 +145,7 @@ impl Spot {
         minus(self.high, self.at)
     }
 
-    /// Moves each coordinate inside its limits by `margin`, a fraction of their distance.
+    /// Moves each coordinate inside its limits by the fraction `margin`.
     fn enclose(&mut self, margin: f32) {
         let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
@@ -157,17 +157,17 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Levels of all hops at the tried positions. The field is the next hop.
+    /// Levels at the tried positions; next hop.
     Levels(u16),
-    /// Target from all levels. The field counts the Newton steps done.
+    /// Target from all levels; Newton steps done.
     Target(u8),
-    /// Sum of the merit, which decides on the step. The field is the next hop.
+    /// Sum of the merit, which decides; next hop.
     Merit(u16),
-    /// Storage of accepted positions and multipliers. The field is the next hop.
+    /// Storage of accepted positions and multipliers; next hop.
     Accept(u16),
-    /// Elimination of all relays. The field is the next segment.
+    /// Elimination of all relays; next segment.
     Eliminate(u16),
-    /// Newton steps of the relays: next segment, and true for its second part. The second part comes first.
+    /// Newton steps: next segment, true for its second part. The second part comes first.
     Substitute(u16, bool),
 }
 
@@ -177,13 +177,12 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Forbidden parts of the line Tx-Rx, as fractions of D. The first keeps relay 1 from Rx, the second relay N from
-    /// Tx.
+    /// Forbidden ends of the line, as fractions of it. First: relay 1 near Rx; second: relay N near Tx.
     pub(super) closed: [f32; 2],
     pub(super) nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Newton steps of the segment's second part, for use in its first.
+    /// Newton steps of the segment's second part.
     second: [Step; SECOND],
     /// Newton step of the next relay toward Rx.
     ahead: Triple,
@@ -191,11 +190,11 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     mu: f32,
     target: f32,
     least: f32,
-    /// Merit at the stored positions; an accepted step does not lower it.
+    /// Merit at the stored positions.
     merit: f32,
-    /// Sum of the barrier's logarithms so far, at the tried positions.
+    /// Sum of the barrier's logarithms so far.
     sum: f32,
-    /// Tried fraction of the Newton step; 0 tests the stored positions.
+    /// Tried fraction of the step; 0 for the stored positions.
     share: f32,
     sums: Sums,
     by_target: f32,
@@ -234,7 +233,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         iterations: 0,
     };
 
-    /// Starts from the positions set by [`Interior::put`]. `is_close` selects the smaller first barrier weight.
+    /// Starts from the positions of [`Interior::put`]. `is_close` selects the smaller first weight.
     pub(super) fn start(&mut self, chain: &Chain<'_, impl SeatOf>, is_close: bool) {
         self.gains = LogGains::new(chain);
         self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
@@ -243,8 +242,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.look(true);
     }
 
-    /// Sets relay `index` to `place`, inside its limits by `margin`. `margin` is a fraction of the distance between the
-    /// limits.
+    /// Sets relay `index` to `place`, inside its limits by `margin`.
     pub(super) fn put(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -259,7 +257,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.settle(chain, index, spot.at);
     }
 
-    /// Stores the position of relay `index`, in units of the Tx-Rx distance.
+    /// Stores the position of relay `index`, in Tx-Rx distances.
     #[inline(never)]
     fn settle(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, [x, y, h]: Triple) {
         let distance_m = chain.distance_m();
@@ -273,7 +271,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the x stored by Algorithm 1 for relay `index`, m.
+    /// Returns the x that Algorithm 1 stored, m.
     pub(super) fn noted_x_m(&self, index: u16) -> f32 {
         let node = self.nodes.get(usize::from(index).wrapping_sub(1));
         node.map_or(0.0, |node| node.hop.level[0])
@@ -283,7 +281,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.nodes.get_mut(usize::from(index).wrapping_sub(1))
     }
 
-    /// Returns the position and limits of node `index`. 0 is Tx, N + 1 is Rx.
+    /// Returns node `index` and its limits; 0 is Tx, N + 1 Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
         if index > chain.relays() {
@@ -319,7 +317,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         step.map_or([0.0; 3], |step| step.map(widened))
     }
 
-    /// Returns node `index` after the tried fraction of its Newton step.
+    /// Returns node `index` after the tried fraction of its step.
     #[inline(never)]
     fn moved(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
@@ -330,7 +328,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns hop `k`, to relay `k`, or to Rx if `k` is N + 1.
+    /// Returns hop `k`, from node `k - 1` to node `k`.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -339,7 +337,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Prepares a test of the stored positions. `resets` is true to reset the Lagrange multipliers.
+    /// Prepares a test of the stored positions.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -352,7 +350,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues by one bounded portion. `Ready` with a target in ln(SIR), slightly below all [levels](Levels).
+    /// Continues by one portion; `Ready` with a target below all levels.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -400,7 +398,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the [levels](Levels) of ten hops from hop `k` on. Adds the barrier of their ends.
+    /// Computes the [levels](Levels) of ten hops, and their barrier.
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -431,8 +429,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Solves `sum of mu / (c - T) = 1` for the target T, in ln(SIR). The sum runs over all levels c. Newton's method
-    /// starts above the solution; the inverse is concave, so T falls.
+    /// Solves `sum of mu / (c - T) = 1` for the target T, in ln(SIR). Newton's method starts above, and T falls.
     fn approach(&mut self, relays: u16, steps: u8) {
         let end = steps + STEPS;
         self.work = Work::Target(end);
@@ -465,8 +462,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts the step if it does not lower the merit, else shortens it. After the last attempt it is repeated without
-    /// negative curvature. If that fails too, the barrier weight falls.
+    /// Accepts the step if it does not lower the merit. Else it is shortened, then repeated without negative curvature.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -492,8 +488,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k` and its hop's multipliers. They stay within the factor [`APART`] of their
-    /// optimal values.
+    /// Stores the new position and multipliers of relay `k`. They stay within the factor [`APART`] of the optimum.
     fn accept(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         if self.share > 0.0 && k <= relays {
@@ -512,8 +507,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the next Newton step, or lowers the barrier weight. `Ready` with the target, in ln(SIR), after the last
-    /// step.
+    /// Starts the next Newton step, or lowers the barrier weight.
     fn continue_with(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -532,8 +526,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers the barrier weight; `Ready` with the target after the last. `resets` is true if no step with the
-    /// multipliers raised the merit.
+    /// Lowers the barrier weight; `Ready` with the target after the last.
     fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
@@ -553,8 +546,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         (hop, weights)
     }
 
-    /// Eliminates the first `count` relays of `segment`. Returns the next relay's equations; `None` if a pivot is not
-    /// positive. `factors` receives the last six eliminated relays.
+    /// Eliminates the first `count` relays of `segment`. `None` if a pivot is not positive.
     #[inline(never)]
     fn eliminate(
         &mut self,
@@ -587,8 +579,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(front)
     }
 
-    /// Eliminates all relays of `segment`; then the next segment or the steps follow. `None` if the system cannot be
-    /// solved.
+    /// Eliminates all relays of `segment`; `None` if impossible.
     fn forward(&mut self, chain: &Chain<'_, impl SeatOf>, segment: u16) -> Option<()> {
         let relays = chain.relays();
         if segment == 0 {
@@ -610,8 +601,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Computes the steps of one part of `segment`, last relay first. `None` if the system cannot be solved or a step
-    /// is not finite.
+    /// Computes the steps of one part of `segment`, last relay first. `None` if a step is not finite.
     fn substitute(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -662,7 +652,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Lowers the common factor on all steps: `spot` stays within its limits. `step` is its step without the factor.
+    /// Lowers the common factor: `spot` stays inside its limits.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let (below, above) = (spot.room_below(), spot.room_above());
         for (step, (below, above)) in step.iter().zip(below.iter().zip(&above)) {
@@ -674,8 +664,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Updates hop `k`'s multipliers for whole Newton steps `from` and `to`. `ends` are the positions before these
-    /// steps.
+    /// Updates hop `k`'s multipliers for whole steps of its ends.
     fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
         let (hop, weights) = self.derivatives(relays, k, ends);
         let ([a, b], [c, d]) = (&hop.by_from, &hop.by_to);

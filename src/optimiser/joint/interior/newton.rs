@@ -29,10 +29,10 @@ use crate::root::sqrt;
 /// Smallest positive pivot, divided by the diagonal element before elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
-/// Curvature of a coordinate with equal limits: it does not move.
+/// Curvature of a coordinate that must not move.
 const STIFF: f32 = 1e18;
 
-/// Equations of one relay, with all previous relays eliminated. The hop to the next relay is not added yet.
+/// Equations of a relay after elimination of all before it. The hop to the next is not added yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Symmetric,
@@ -42,20 +42,19 @@ pub(super) struct Front {
     taken: Triple,
 }
 
-/// Equation of an eliminated relay after forward substitution. First the coefficients of the next relay's x, y and h.
-/// Then the constant, and the part per unit of the target's change.
+/// Equation of an eliminated relay: next relay's x, y, h; constant; per target change.
 type Row = [f32; 5];
 
 /// Equations of an eliminated relay, for its Newton step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// Cholesky factor: 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal is inverted, because it is a divisor.
+    /// Cholesky factor: 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal is inverted.
     lower: [f32; 6],
     /// Equations for the steps in x, y and h.
     rows: [Row; 3],
 }
 
-/// Sums over all hops and relays, for the target's Newton step.
+/// Sums over all relays, for the target's Newton step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,
@@ -63,7 +62,7 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Lagrange multipliers and slacks of a hop, and barrier weight `mu`.
+/// Multipliers and slacks of a hop, and the barrier weight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -83,7 +82,7 @@ impl Weights {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the multipliers after the slacks change by a and b.
+    /// Returns the multipliers after changes of the slacks.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -98,9 +97,8 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop`. `self` has its rows on entry, those of the hop's end `spot` on return.
-    /// `is_relay` is false for Tx: the factor is 0. `None` if a pivot is not positive. In a `convex` system rounding
-    /// alone makes a pivot too small; it is raised.
+    /// Eliminates the relay before `hop`; `None` if a pivot is not positive. In a `convex` system a small pivot is a
+    /// rounding error.
     pub(super) fn pass(
         &mut self,
         is_relay: bool,
@@ -141,7 +139,7 @@ impl Front {
         add_scaled(&mut self.column, slope, ratio);
     }
 
-    /// Adds the barrier that keeps the relay at `spot` inside its limits.
+    /// Adds the barrier that keeps the relay inside its limits.
     fn enclose(&mut self, mu: f32, spot: &Spot) {
         let ([a, b, c], [d, e, f]) = (spot.room_below(), spot.room_above());
         let [xx, _, _, yy, _, hh] = &mut self.bend;
@@ -151,7 +149,7 @@ impl Front {
         barrier(mu, c, f, h, hh);
     }
 
-    /// Adds the hop to the next node, then eliminates this relay. `None` if a pivot is not positive.
+    /// Adds the next hop, then eliminates; `None` without positive pivot.
     fn eliminate(
         &mut self,
         hop: &Derivatives,
@@ -215,8 +213,7 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of the barrier `mu (ln a + ln b)`. The second derivative is negated. a and b are the distances
-/// to the limits.
+/// Adds the derivatives of `mu (ln a + ln b)`, the second negated.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
@@ -228,7 +225,7 @@ fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     }
 }
 
-/// Adds `weight` a b' to the first three columns of `rows`.
+/// Adds `weight` a b' to the first three columns.
 #[inline(never)]
 fn add_product(rows: &mut [Row; 3], a: &Triple, b: &Triple, weight: f32) {
     for ([x, y, h, ..], a) in rows.iter_mut().zip(a) {
@@ -240,7 +237,7 @@ fn add_product(rows: &mut [Row; 3], a: &Triple, b: &Triple, weight: f32) {
     }
 }
 
-/// Subtracts `part` times `from` from `to`, and scales `to` by `scale`.
+/// Subtracts `part` times `from`, then scales by `scale`.
 #[inline(never)]
 fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
     for (cell, from) in to.iter_mut().zip(from) {
@@ -261,7 +258,7 @@ impl Factor {
         rows: [[0.0; 5]; 3],
     };
 
-    /// Returns this relay's step from those of the target and next relay.
+    /// Returns this relay's step from the target's and next relay's.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
         let known = (self.rows)
             .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));
@@ -276,7 +273,7 @@ impl Sums {
         column: 0.0,
     };
 
-    /// Returns the target's Newton step; `None` if there is no maximum.
+    /// Returns the target's step; `None` without a maximum.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;
         (rest > 0.0).then(|| self.slope / rest)

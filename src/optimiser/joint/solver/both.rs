@@ -27,17 +27,16 @@ use core::task::Poll;
 /// Number of relays per call that get initial positions.
 const PUT: u16 = 20;
 
-/// Fractions by which relays move toward even spacing before the interior-point method. This separates relays at the
-/// same x. First for the first run, then for repetitions.
+/// Part of the way to even spacing before a run; first, repeated. It separates relays at the same x.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Initial chain, told from the end with more power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offsets of the first, middle and last relay, away from the interferer. They are fractions of the largest
-    /// permitted offset.
+    /// Lateral offsets of first, middle and last relay, away from the interferer. Fractions of the largest permitted
+    /// one.
     aside: [f32; 3],
-    /// Altitudes of the first and last relay: 0 lowest, 1 highest.
+    /// Altitudes of first and last relay: 0 lowest, 1 highest.
     up: [f32; 2],
     along: Along,
 }
@@ -47,10 +46,9 @@ struct Start {
 enum Along {
     /// x from Algorithm 1.
     Line,
-    /// Evenly spaced: first and last x, from the end with more power. They are fractions of the Tx-Rx distance.
+    /// Evenly spaced from first to last x, as fractions from the stronger end.
     Even([f32; 2]),
-    /// x from Algorithm 1, without those that `close_beyond` excludes. The cross-sections follow an ellipse down to the
-    /// end with less power.
+    /// x from Algorithm 1 without the excluded ones; a falling ellipse. See `close_beyond`.
     Arc,
 }
 
@@ -68,7 +66,7 @@ impl Start {
         Self { aside, up, along }
     }
 
-    /// Returns the lateral offset and altitude of relay `index` in `room`.
+    /// Returns relay `index`'s lateral offset and altitude in `room`.
     fn cross_section(self, chain: &Chain<'_, impl SeatOf>, index: u16, room: Room) -> CrossSection {
         let (relays, before) = (chain.relays(), before(chain, index));
         // 0 for the relay at the end with more power, 1 for the relay at the other end.
@@ -111,13 +109,13 @@ enum Purpose {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Initial lateral offsets and altitudes. The field counts the relays done.
+    /// Initial lateral offsets and altitudes; relays done.
     Begin(u16),
     /// Highest target that Algorithm 1 meets.
     Seek(Seek, Purpose),
-    /// All x by Algorithm 1 for this target, in ln(SIR).
+    /// Relays' x by Algorithm 1 for this target, in ln(SIR).
     Settle(f32),
-    /// Start of the interior-point method. The field counts the relays done.
+    /// Start of the interior-point method; relays done.
     Put(u16),
     Interior,
 }
@@ -136,7 +134,7 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     reached: f32,
     /// Number of repeated interior-point runs of this initial chain.
     again: u8,
-    /// Number of the initial chain; in chain 0 the altitude is common.
+    /// Number of the initial chain; 0 has the common altitude.
     number: u8,
 }
 
@@ -154,7 +152,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     };
 
     /// Continues by one portion; `Ready` with the linear target SIR. Two relays of Algorithm 1, ten of a Newton step,
-    /// or twenty otherwise.
+    /// else twenty.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let next = match self.work {
             Work::Begin(done) => self.begin_start(chain, done),
@@ -217,8 +215,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Begin(0)
     }
 
-    /// Chooses the lateral offsets and altitudes of the initial chain. The first `done` relays have theirs. After the
-    /// last chain the final search follows.
+    /// Chooses initial offsets and altitudes after the first `done` relays.
     fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -253,10 +250,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Excludes the x beyond the interferer near the end with more power. There the relay's SIR rises with its distance
-    /// from that end. It is proportional to `((x - X)^2 + a^2) / (x^2 + a^2)`, smallest at `x (x - X) = a^2`. X is the
-    /// interferer's x from that end, a the distance from the line. For a the code uses the interferer's distance from
-    /// the relay's cross-section.
+    /// Excludes the x beyond the interferer, near the stronger end. The SIR there rises:
+    /// `((x - X)^2 + a^2) / (x^2 + a^2)`, smallest at `x (x - X) = a^2`. X and x count from that end; a is the distance
+    /// from the line, here from the relay's cross-section.
     fn close_beyond(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let (distance_m, is_turned) = (chain.distance_m(), is_turned(chain));
         let index = if is_turned { chain.relays() } else { 1 };
@@ -276,14 +272,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the current initial chain; `None` after the last. Chain 0 uses only `along` of chain 1.
+    /// Returns the initial chain; `None` after the last. Chain 0 uses only `along` of chain 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
     }
 
-    /// Stores the chain if its target `sigma`, ln(SIR), is best so far. Returns the next work: an interior-point run,
-    /// if promising, else the next chain.
+    /// Stores the chain if its target `sigma` is best; returns the next work.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);
@@ -302,8 +297,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the interior-point method. The first `done` relays have their positions. The x come from Algorithm 1 or
-    /// are even; the rest is stored.
+    /// Starts the interior-point method after the first `done` relays.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.relays();
@@ -340,7 +334,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Interior
     }
 
-    /// Continues Algorithm 1 for the target `sigma`, in ln(SIR). `Ready(None)` if it cannot be met.
+    /// Continues Algorithm 1 for `sigma`, in ln(SIR); `None` if missed.
     fn line(&mut self, chain: &Chain<'_, impl SeatOf>, sigma: f32) -> Poll<Option<bool>> {
         let Interior {
             cells,
@@ -352,15 +346,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if the initial chains are told from Rx. That is so if Rx has more power than Tx. With equal powers: if
-/// less SIR is required backward.
+/// Returns true if initial chains are described from Rx. Then Rx has more power, or equal power and a lower required
+/// SIR.
 fn is_turned(chain: &Chain<'_, impl SeatOf>) -> bool {
     let config = chain.mission.config();
     let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
     rx_w > tx_w || (rx_w >= tx_w && config.reverse < 1.0)
 }
 
-/// Returns the number of relays between `index` and the stronger end.
+/// Returns the number of relays nearer to the stronger end.
 fn before(chain: &Chain<'_, impl SeatOf>, index: u16) -> u16 {
     if is_turned(chain) {
         chain.relays() - index
@@ -369,18 +363,17 @@ fn before(chain: &Chain<'_, impl SeatOf>, index: u16) -> u16 {
     }
 }
 
-/// Returns a point on the unit circle, (1, 0) to (0, 1). `part` runs from 0 to `whole`.
+/// Returns a point on the unit circle, (1, 0) to (0, 1).
 fn quarter(part: u16, whole: u16) -> [f32; 2] {
     let [a, b] = [whole.saturating_sub(part), part].map(f32::from);
     let radius = sqrt(square(a) + square(b));
     [a / radius, b / radius]
 }
 
-/// Minimum improvement for another interior-point run, in ln(SIR). It is Algorithm 1's target minus that of the last
-/// run.
+/// Minimum improvement for another run, in ln(SIR).
 const NEW: f32 = 3e-4;
 /// Maximum number of repeated interior-point runs per initial chain.
 const AGAIN: u8 = 4;
 
-/// First target tried above the interior-point result, in ln(SIR). It is the possible error of that method.
+/// Start of the search above the result, in ln(SIR): its error.
 const ABOVE: f32 = 1e-4;

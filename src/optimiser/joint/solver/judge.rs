@@ -16,11 +16,10 @@ use core::task::Poll;
 /// Precision of an improved chain's highest target, in ln(SIR).
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound on a chain's SIR, in ln(SIR). A chain this close ends the search.
+/// Tolerance of the upper bound, in ln(SIR); it ends the search.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Margin above the upper bound at which a rising target stops, ln(SIR). The search then checks if the chain reaches
-/// the bound.
+/// Margin above the bound where a rising target stops, ln(SIR).
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -43,8 +42,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records the result of the tried target; selects the next work. `met` is `None` if infeasible. It is true if some
-    /// relays must stay short of their farthest positions.
+    /// Records the result of the tried target; selects the next work. `met`: `None` if infeasible, true if some relays
+    /// must stay short.
     pub(super) fn tried(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -151,8 +150,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the search for the chain's highest target after an improvement. Hops are exactly those of relays in
-    /// flight, which may stay short. The improvement ended at `sigma`; `ceiling` bounds all chains; both are ln(SIR).
+    /// Returns the search for the improved chain's highest target. Hops are as in flight. `sigma` ended the
+    /// improvement; `ceiling` bounds all chains; in ln(SIR).
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -163,13 +162,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the current chain can become the best one. It is improved again.
+    /// Returns true if the chain can become the best one.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current chain cannot become the best one. `turn` is its next action.
+    /// Returns true if the chain cannot become the best one.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -204,8 +203,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays for moves of single relays. With fixed altitudes they are always moved, because such chains
-/// have kinks.
+/// Maximum number of relays for single moves. Chains with fixed altitudes have kinks, and are always moved.
 const POLISHED: u16 = 5;
 
 /// Number of halvings of single relays' trial moves.
@@ -219,8 +217,7 @@ pub(super) const GAIN: f32 = 2e-5;
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the trial move: relay index, kind, and number of halvings. Kinds 0 to 3 are down, up, left, right. Kinds
-    /// 4 and 5 copy the relay two places toward Rx or Tx.
+    /// Returns the trial move: relay, kind, and halvings. Kinds 0 to 3: down, up, left, right; others copy a relay.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -228,8 +225,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of one relay; `sigma` is met, in ln(SIR). It is a fraction of the range, or another relay's
-    /// cross-section. The derivatives do not show these improvements: another constraint is active.
+    /// Tries the next move of one relay, from the target `sigma`. The derivatives do not show these improvements:
+    /// another constraint is active.
     pub(super) fn polish(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -325,7 +322,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns true if the initial chain `start` cannot beat the best one.
+    /// Returns true if `start` cannot beat the best chain.
     fn is_skipped(&self, chain: &Chain<'_, impl SeatOf>, start: Start) -> bool {
         match start {
             Start::Near if self.again => false,
@@ -341,8 +338,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`. For [`Purpose::Start`] from a new initial chain, else
-    /// from storage.
+    /// Returns relay `index`'s lateral offset and altitude. For [`Purpose::Start`] new ones, else stored ones.
     pub(super) fn shaped(
         &self,
         chain: &Chain<'_, impl SeatOf>,

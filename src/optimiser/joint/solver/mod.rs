@@ -65,9 +65,9 @@ enum Work {
     Settle(f32, Purpose),
     /// Move one relay; the chain meets this target, ln(SIR).
     Polish(f32),
-    /// Compute the moves of this segment, from Rx back to Tx.
+    /// Compute this segment's moves, from Rx to Tx.
     Back(u8),
-    /// Move the relays: fraction of the moves, target ln(SIR), true to store.
+    /// Move the relays: fraction, target ln(SIR), true to store.
     Forward(f32, f32, bool),
 }
 
@@ -81,17 +81,16 @@ enum Purpose {
     Tighten,
     /// Highest target of an improved chain, with margins.
     Judge,
-    /// Highest target of an improved chain, with hops as in flight.
+    /// Highest target of an improved chain, as in flight.
     Last,
-    /// Check against the upper bound, with hops as in flight.
+    /// Check against the upper bound, as in flight.
     Probe,
-    /// Check of one relay's move, with hops as in flight.
+    /// Check of one relay's move, as in flight.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if hops are exactly as relays compute them in flight. Relays may then stay short of their farthest
-    /// positions.
+    /// Returns true if hops are exactly as in flight. Relays may then stay short of their farthest positions.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -108,24 +107,24 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target, ln(SIR), and its initial chain's number.
     best: Option<(f32, u8)>,
-    /// Highest target that any improvement reached, ln(SIR). Chains predicted below it are dropped.
+    /// Highest target of any improvement, ln(SIR). Chains predicted below it are dropped.
     highest: f32,
     best_cells: Cells<RELAYS>,
-    /// Target at the end of the best improvement, ln(SIR). The last search starts there.
+    /// Target at the end of the best improvement, ln(SIR).
     best_judged: Option<f32>,
-    /// Target at the end of this chain's improvement, ln(SIR). `None` while it runs or if it was stopped early.
+    /// Target at the end of this improvement, ln(SIR). `None` while it runs or if stopped early.
     judged_at: Option<f32>,
     /// True unless this improvement was stopped early.
     is_whole: bool,
-    /// True in the last phase: finer search, and moves of single relays.
+    /// True in the last phase, with moves of single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
     line: Line,
-    /// x of each relay and its limit, m, as in flight.
+    /// x of each relay and its limit, m.
     notes: [[f32; 2]; RELAYS],
-    /// True if some relays must stay short of their farthest positions.
+    /// True if some relays must stay short.
     holds_back: bool,
     /// True if the minimum separation restricted any improvement.
     walled: bool,
@@ -194,8 +193,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::NONE;
     }
 
-    /// Stores the lateral offset and altitude of relay `index`. For a segment's first relay also `x_m`, the previous
-    /// relay's x.
+    /// Stores the lateral offset and altitude of relay `index`. A segment's first relay also stores `x_m`, the previous
+    /// x.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -204,7 +203,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.set(index, cell);
     }
 
-    /// Returns the stored state of the segment that begins at `index`.
+    /// Returns the state of the segment beginning at `index`.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -213,13 +212,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Solvers for both directions: 1 with `altitude` and `reverse`, else 0.
+/// Solvers both ways: 1 with `altitude` and `reverse`, else 0.
 const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
 /// Solvers for fitted slots: 1 with `altitude`, else 0.
 const FITTED: usize = ALTITUDE as usize;
 
-/// Joint solver: one direction, both, or fitted slots, in shared memory.
+/// Joint solver: one of three kinds, which share memory.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -235,7 +234,7 @@ enum Way<const RELAYS: usize, const SEGMENTS: usize> {
     Fitted([Fitted<RELAYS>; FITTED]),
 }
 
-/// Joint solver of a chain of at most `RELAYS` relays. `SEGMENTS` is at least a tenth of `RELAYS`.
+/// Joint solver of at most `RELAYS` relays. `SEGMENTS` is at least a tenth of it.
 #[derive(Clone, Debug)]
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize>(Way<RELAYS, SEGMENTS>);
 
@@ -243,13 +242,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// State before [`Solver::begin`].
     pub(crate) const NEW: Self = Self(Way::OneWay(OneWay::NEW));
 
-    /// Creates a joint solver. `None` for an interference field, too many relays, or without the feature `altitude`.
+    /// Creates a joint solver; `None` if the mission does not allow it. Not in an interference field, nor without the
+    /// feature `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let mut solver = Self::NEW;
         solver.begin(mission).then_some(solver)
     }
 
-    /// Prepares the solver for `mission`. False for an interference field or too many relays.
+    /// Prepares the solver; false if the mission does not allow it.
     #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
         if mission.fitted_gap() > 0.0 {
@@ -269,20 +269,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the lateral offset and altitude of relay `index` once solved. `seat` is its profile.
+    /// Returns the solved lateral offset and altitude of relay `index`.
     pub fn at(&self, index: u16, seat: Seat) -> CrossSection {
         let cell = self.cells().map(|cells| cells.get(index));
         cell.unwrap_or_default().place(seat.room)
     }
 
-    /// Returns the largest x with room for later relays, m, once solved. It equals the solver's limit to the bit.
+    /// Returns the largest x with room for later relays, m. To the bit the solver's limit.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let chain = Chain::new(mission, seat_of);
         let solved = chain.zip(self.cells());
         solved.map_or(0.0, |(chain, cells)| cells.end_m(&chain, index))
     }
 
-    /// Returns true if some relays must stay short of their farthest x.
+    /// Returns true if some relays must stay short.
     pub const fn holds_back(&self) -> bool {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,
@@ -291,10 +291,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Continues by one step; `Ready` with the linear target SIR.
-    ///
-    /// `seat_of` returns the profile of relay 1..=N, always the same. Work: one direction ten or twenty relays, both
-    /// directions at least two.
+    /// Continues by one step; `Ready` with the linear target SIR. `seat_of` must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target can be met.
@@ -314,7 +311,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solved.unwrap_or(Poll::Ready(Err(Infeasible)))
     }
 
-    /// Returns position and time slots of relay `index` once solved. `None` unless the mission has fitted slots.
+    /// Returns the solved position and time slots, if slots are fitted.
     pub fn fitted(
         &self,
         mission: &Mission,
@@ -401,8 +398,7 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solver's result as bits, and the number of calls. First the target, then the lateral offsets and
-    /// altitudes. `once_more` computes the best chain again.
+    /// Returns the solver's result as bits, and the number of calls. `once_more` computes the best chain again.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -436,8 +432,8 @@ mod tests {
         (bits, portions)
     }
 
-    /// Checks that the stored best chain equals one computed again, to the bit. `UAV_RELAY_KEPT` sets the number of
-    /// random missions, 150 by default.
+    /// Checks the stored best chain against one computed again, to the bit. `UAV_RELAY_KEPT` missions are tried, 150 by
+    /// default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;

@@ -21,8 +21,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Computes the moves of `segment`'s ten relays. Returns the value function of the relay before it, at `before`.
-    /// `None` if a hop cannot meet the target.
+    /// Computes `segment`'s moves; returns the previous relay's value function. `None` if a hop cannot meet the target.
     pub(super) fn recall(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -103,8 +102,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Continues to move relays by one segment, or computes its moves first. Tries the fraction `share` with the target
-    /// `sigma`; `kept` stores the chain.
+    /// Continues to move relays by one segment; `kept` stores them.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -145,8 +143,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share`. `kept` stores the results. `None` if a hop cannot meet
-    /// `target`.
+    /// Moves the relays of `segment` by the fraction `share`. `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -183,12 +180,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 /// Number of relays per call when only x is computed.
 const PLAIN: u16 = 20;
 
-/// Largest penalty of a feasible improved chain, in units of the Tx-Rx distance.
+/// Largest penalty of a feasible chain, in Tx-Rx distances.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Continues to compute only the x, for the target `sigma` = ln(SIR). `kept` stores the chain. At the end the
-    /// slack, m; `None` if a hop cannot meet the target.
+    /// Continues to compute x for the target `sigma`; `kept` stores. The result is the slack, m, or `None` if missed.
     pub(super) fn plain(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -225,7 +221,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index` with its hop from `from`. [`Start::Through`] has no minimum separation.
+    /// Returns relay `index` as receiver. [`Start::Through`] has no separation.
     pub(super) fn link<'a>(
         &self,
         chain: &Chain<'a, impl SeatOf>,
