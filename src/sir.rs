@@ -13,7 +13,7 @@ use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::root::{PowerRatio, bisected, sqrt};
 
-/// Returns the inverse interference at `at`: SIR = gain x it / squared length. Interferer: `s / (1 + nu s)`,
+/// Returns the inverse interference at `at`, a factor of the SIR. Interferer: `s / (1 + nu s)`,
 /// `s = (X - x)^2 + (Y - y)^2 + h^2`, m^2. Field: `Upsilon(x) / Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {

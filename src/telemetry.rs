@@ -31,7 +31,7 @@ pub struct Report {
     pub holds_lease: bool,
     /// Control state of the drone; `None` without an autopilot link.
     pub control: Option<State>,
-    /// Reasons why the drone holds: due to each neighbour.
+    /// Reasons why the drone holds, one for each neighbour.
     pub hold_reasons: [Option<HoldReason>; 2],
     /// Node numbers of the neighbours; `None` for none.
     pub neighbours: [Option<u16>; 2],

@@ -98,7 +98,7 @@ impl Add<Duration> for Instant {
 /// Largest backward step that counts as calls in wrong order.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum advance per call: a wrong reading stops no timer.
+/// Maximum advance per call; a wrong reading then stops no timer.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
 /// Clock of internal time, which never runs backward.

@@ -51,7 +51,7 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, at most `most` above this number. It bounds the step by a received view.
+    /// Returns `view`, at most `most` above this number. A received view cannot raise the number further.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {

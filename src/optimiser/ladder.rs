@@ -24,7 +24,7 @@ pub struct Ladder {
     gap: u8,
     /// Code of the gaps' growth outward, `1 + growth / 16`.
     growth: u8,
-    /// True if every relay takes its farthest x. False if relays may stay short.
+    /// True if every relay takes its farthest x; false if it may stop before.
     plain: bool,
 }
 

@@ -180,7 +180,7 @@ impl Hops {
         REVERSE && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the lower SIR: the paper's local SIR.
+    /// Returns the SIR of the worse hop: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
@@ -216,11 +216,11 @@ pub struct LocalSearch {
     round: u8,
     row: u8,
     column: u8,
-    /// Best altitude of the round, m, and its lower SIR.
+    /// Best altitude of the round, m, and its worse hop's SIR.
     best_row: (f32, f32),
     /// Best position; `None` if none beats the current one.
     found: Option<Placement>,
-    /// Lower SIR of the best position so far, linear.
+    /// SIR of the worse hop at the best position, linear.
     best_sir: f32,
     /// Number of evaluations at this altitude; counted for both directions.
     evaluations: u16,
@@ -268,12 +268,12 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Records `at` if best; returns its lower SIR. -1 if not allowed.
+    /// Records `at` if best; returns its worse hop's SIR. -1 if not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
         self.record(at, self.hops.worse(at))
     }
 
-    /// Records `at` with the lower SIR `sir`, as [`weigh`](Self::weigh) does.
+    /// Records `at` with the SIR `sir`, as [`weigh`](Self::weigh) does.
     fn record(&mut self, at: Placement, sir: f32) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
@@ -285,7 +285,7 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude, m: `part` 0 lowest, 1 highest. Never above, in spite of rounding.
+    /// Returns an altitude, m: `part` 0 lowest, 1 highest. Never above the highest, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -319,7 +319,7 @@ impl LocalSearch {
         })
     }
 
-    /// Searches the best x at `altitude_m`; returns the lower SIR. -1 if no x is allowed.
+    /// Searches the best x at `altitude_m`; returns its worse hop's SIR. -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
@@ -344,8 +344,8 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Returns the best lower SIR for x in `low` to `high`. Narrow maxima have equal SIRs: bisection finds the first
-    /// two.
+    /// Returns the best SIR of the worse hop, for x in `low` to `high`. Narrow maxima have equal SIRs: bisection finds
+    /// the first two.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {

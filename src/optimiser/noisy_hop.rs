@@ -48,10 +48,10 @@ const STEPS: u8 = 32;
 /// Maximum number of bisection steps.
 pub(super) const HALVINGS: u8 = 32;
 
-/// Number of Newton steps for the change of curvature's sign.
+/// Newton steps to find where the curvature changes its sign.
 const TURNS: u8 = 5;
 
-/// Relative rounding error of the margin g.
+/// Relative rounding error of the margin to the target.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of length that ends the search.
@@ -66,9 +66,9 @@ pub(super) struct NoisyHop {
     pub(super) excess: f32,
     /// Distance u along x from sender to interferer, m.
     pub(super) ahead: f32,
-    /// Squared distance a^2 from interferer to receiver, without x, m^2.
+    /// Squared distance a^2 from interferer to receiver perpendicular to x, m^2.
     pub(super) aside_squared: f32,
-    /// Squared distance b^2 from sender to receiver, without x, m^2.
+    /// Squared distance b^2 from sender to receiver perpendicular to x, m^2.
     pub(super) across_squared: f32,
     /// Difference `a^2 - b^2`, m^2, without cancellation.
     pub(super) base: f32,
@@ -89,7 +89,8 @@ impl NoisyHop {
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the margin g at `d`, half its derivative, its rounding error. `d` must meet the target by SNR alone.
+    /// Returns the margin to the target, half its derivative, its rounding error. `d` must meet the target by SNR
+    /// alone.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -110,7 +111,7 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance where g's curvature changes sign, m. `None` if concave everywhere.
+    /// Returns the distance where the margin's curvature changes sign, m. `None` if concave everywhere.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -155,7 +156,7 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest length that meets the target, m. g must be concave in [`low`, `high`], below 0 at `high`.
+    /// Returns the largest length that meets the target, m. The margin must be concave, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -178,8 +179,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest length that meets the target, m. g must be convex in [`low`, `high`], at least 0, then
-    /// below.
+    /// Returns the largest length that meets the target, m. The margin must be convex, at least 0 at `low`, below 0 at
+    /// `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

@@ -31,10 +31,10 @@ use crate::sir::{self, Sender, square, transmitter_gain};
 /// Maximum number of tried positions of the last relay.
 const HOLDS: u8 = 4;
 
-/// Maximum field points per call; a target is completed.
+/// Maximum field points per call, unless one target needs more.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Relay whose message arrives now: the previous one.
+/// Previous relay along the chain, by its message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
@@ -67,7 +67,7 @@ pub struct Link<'a> {
     pub own: Station,
     /// Upsilon (mean inverse interference) here, 1/W, if measured.
     pub measured_per_w: Option<f32>,
-    /// True if every relay takes its farthest x. False if relays may stay short.
+    /// True if every relay takes its farthest x; false if it may stop before.
     pub plain: bool,
     /// Maximum x with room for later relays, m. Only in the joint method.
     pub end_m: Option<f32>,
@@ -149,7 +149,7 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop meets `target`. Both directions must, in order and separated.
+    /// Returns true if the hop meets `target`. Both directions must meet it; relays must keep order and separation.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -294,8 +294,7 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the slack and this last relay's x, m, both directions. It stays short of `reach` if Rx would be too
-    /// weak.
+    /// Returns the slack and this last relay's x, m, both directions. It stops before `reach` if Rx would be too weak.
     fn held(
         &self,
         hop: &FromRx,
@@ -411,8 +410,8 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result for `ladder`; `slacks` in m. The highest met target is committed if the next is within
-    /// tolerance, or if single.
+    /// Returns the result for `ladder`; `slacks` in m. The highest met target is committed if the next is close, or it
+    /// is single.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -439,7 +438,7 @@ impl Verdict {
     }
 }
 
-/// Returns the number of targets up to the highest met. Lower missed targets count.
+/// Returns the number of targets up to the highest met. Lower missed targets count as met.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()

@@ -10,11 +10,11 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Agreed target SIR, and its ladder.
+/// Agreed target SIR, and its ladder (list of targets).
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
-    /// Ladder with the committed target.
+    /// List of targets with the committed one.
     pub ladder: Ladder,
     /// Index of the committed target in the ladder.
     pub commit: u8,
@@ -22,7 +22,7 @@ pub struct Agreed {
     pub target: f32,
     /// Target SIR that no chain here meets, linear. `None` with the paper's step or both directions.
     pub most: Option<f32>,
-    /// Number of ladders tried.
+    /// Number of target lists tried.
     pub sweeps: u32,
 }
 
@@ -117,7 +117,7 @@ impl Planner {
     }
 }
 
-/// Solves the chain in one call: at most some fifty ladders.
+/// Solves the chain in one call: at most some fifty target lists.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.

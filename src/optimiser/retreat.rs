@@ -208,7 +208,8 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest receiver x with a backward hop, m. Infinite for one direction, -infinite if none.
+    /// Returns the largest receiver x whose backward hop reaches `place`, m. Infinite for one direction, -infinite if
+    /// none.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;

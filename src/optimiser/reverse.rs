@@ -56,7 +56,8 @@ const MOST_SQUARED: f32 = 1e18;
 /// Backward hop, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Backward gain / r: times inverse interference / squared length. At Tx, m^2, it includes the interference.
+    /// Backward gain / r: SIR / r = `gain q / l`, q inverse interference, l squared length. At Tx, m^2, it includes the
+    /// interference.
     gain: f32,
     /// True if Tx is the receiver.
     to_tx: bool,
@@ -125,15 +126,15 @@ impl Back {
         }
     }
 
-    /// Returns the distance from the interferer that misses `target`, m. `squared` is the hop's, m^2. `None` if missed
-    /// everywhere.
+    /// Returns the distance from the interferer below which `target` is missed, m. `squared` is the hop's, m^2. `None`
+    /// if missed everywhere.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }
 }
 
-/// Returns the distance from the interferer with q < `needed`, m. `q = s / (1 + noise s)`, s the squared distance.
-/// `aside_squared` is perpendicular to x. `None` if everywhere.
+/// Returns the distance from the interferer below which q < `needed`, m. `q = s / (1 + noise s)`, s the squared
+/// distance. `None` if everywhere.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

@@ -69,7 +69,7 @@ const BEND: f32 = 0.25;
 /// Maximum bracket width after / before for interpolated targets.
 const PROGRESS: f32 = 0.25;
 
-/// Number of ladders after which the search ends.
+/// Number of target lists after which the search ends.
 const MOST_SWEEPS: u32 = 48;
 
 /// Leader's search for the highest target: bracket and next targets.
@@ -83,7 +83,7 @@ pub struct Search {
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the last bracket.
+    /// Relative width of the previous bracket (interval of targets).
     width: f32,
     ladder: Ladder,
     tried: u32,
@@ -338,7 +338,7 @@ struct StandTrials {
     high: f32,
     /// Highest accepted target and its ladder; `None` before the first.
     best: Option<(f32, Ladder)>,
-    /// True at the end.
+    /// True once the search has ended.
     over: bool,
 }
 

@@ -53,7 +53,7 @@ use crate::sir::{Sender, in_noise, square};
 pub enum RequiredPosition {
     /// The previous node takes its farthest x, or cannot move.
     AtReach,
-    /// The previous relay takes this x, m, and stays short.
+    /// The previous relay takes this x, m, before its farthest.
     At(f32),
 }
 
@@ -75,7 +75,7 @@ pub struct Hop {
     interferer_x_m: f32,
     /// Squared distance receiver to interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Difference a^2 - b^2 of squared distances without x, m^2. `(Y - y0) (Y + y0 - 2y) + h0 (2h - h0)`: no
+    /// Difference a^2 - b^2 of squared distances perpendicular to x, m^2. `(Y - y0) (Y + y0 - 2y) + h0 (2h - h0)`: no
     /// cancellation.
     base: f32,
     /// Squared distance receiver to sender perpendicular to x, m^2.
@@ -94,8 +94,8 @@ pub struct Hop {
 }
 
 impl Hop {
-    /// Creates the hop to relay `index` at `at`. `spread_squared` is later neighbours' largest squared distance without
-    /// x, m^2.
+    /// Creates the hop to relay `index` at `at`. `spread_squared` is later neighbours' largest squared distance
+    /// perpendicular to x, m^2.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -327,7 +327,7 @@ impl Hop {
         (self.before(place) >= 0.0).then_some(place)
     }
 
-    /// Returns the largest separated sender x, m.
+    /// Returns the largest sender x separated from `place`, m.
     fn before(&self, place: f32) -> f32 {
         let from = place - self.least_step;
         if place - from < self.least_step || from >= place {
@@ -452,8 +452,8 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the paper's `d_max`, `sqrt(K / gamma - y^2 - h^2)`, m, at most 1e9. `None` if always too weak. It can exceed
-/// the Tx-Rx distance: smooth for the root search.
+/// Returns the paper's `d_max`, `sqrt(K / gamma - y^2 - h^2)`, m, at most 1e9. `None` if even a relay right above Rx is
+/// too weak. It can exceed the Tx-Rx distance: smooth for the root search.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;

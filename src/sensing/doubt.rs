@@ -68,13 +68,13 @@ const REST: u8 = 4;
 /// relative difference.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays to identify a faulty one. Four always leave a perfect fit.
+/// Minimum number of relays to identify a faulty one. With four, the other three always fit.
 const FEWEST: u16 = 5;
 
 /// Minimum number of measured positions; older ones count less ([`Sums::count`]).
 const ENOUGH: f32 = 3.5;
 
-/// Maximum mean weight divided by one position's: above, rounding wins.
+/// Maximum mean weight / weight of one position; above it rounding dominates.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -223,7 +223,7 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor to the estimate (or its inverse) that a relay doubts.
+/// Factor between measurement and estimate that a relay doubts.
 const ABSURD: f32 = 300.0;
 
 /// Returns true if a measurement is absurd. It is far from `expected`, and inconsistent with `others`.

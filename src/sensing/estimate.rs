@@ -103,18 +103,18 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change that is ignored.
+/// Mean square relative change below which an estimate is kept.
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change that is a refinement.
 const CHANGE: f64 = 1e-4;
 
-/// Change / chance up to which a stationary source is only refined.
+/// Change / expected change, below which a stationary source is only refined.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Change / chance up to which a moving source is only refined.
+/// Change / expected change, below which a moving source is only refined.
 const FOLLOWED: f64 = 1.5;
 
-/// Change / chance that shows another source, after [`REFINED`] refinements. For a stationary source.
+/// Change / expected change that shows another source. It applies after [`REFINED`] refinements of a stationary source.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level at Rx.

@@ -222,7 +222,7 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the variance is small: four times the expected one. Positions must exceed unknowns.
+    /// Returns true if the variance is below four times the expected one. Positions must exceed unknowns.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }

@@ -246,7 +246,7 @@ impl Sums {
     }
 }
 
-/// Minimum distance of different positions, as a fraction.
+/// Minimum distance of different positions, as a fraction of the Tx-Rx distance.
 const APART: f32 = 1.0 / 200.0;
 
 /// Measurements of one relay: the mean here, and earlier sums.
@@ -346,7 +346,7 @@ impl Listener {
     }
 }
 
-/// Returns the remaining weight, 1 to 0.
+/// Returns the weight that remains at `age`, 1 to 0.
 pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
     libm::exp2f(-(age.as_micros() as f32 / half_life.as_micros() as f32))
 }

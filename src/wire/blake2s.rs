@@ -62,7 +62,7 @@ pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     (u64::from(high) << 32 | u64::from(low)).to_le_bytes()
 }
 
-/// Compresses one block; `count` includes it.
+/// Compresses one block; `count` is the bytes so far, with it.
 #[inline(never)]
 fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     let mut words = [0; 16];

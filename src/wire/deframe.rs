@@ -24,14 +24,14 @@ error_texts!(DeframeError {
     Truncated => "the frame ended inside a COBS block",
 });
 
-/// Decoder from a byte stream to frames, without COBS.
+/// Decoder that splits a byte stream into frames.
 #[derive(Clone, Debug)]
 pub struct Deframer {
     plain: [u8; MAX_DECODED],
     len: usize,
     /// Remaining bytes of the COBS block; 0 before a code.
     run: u8,
-    /// True to insert a zero after the block, unless last.
+    /// True to insert a zero after this COBS block, unless last.
     zero_after: bool,
     oversized: bool,
 }

@@ -164,7 +164,7 @@ impl Endpoint {
         }
     }
 
-    /// Returns true if node `to` can check tags.
+    /// Returns true if node `to` can check this node's tags.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.session().is_some_and(|session| session.knows(to))
     }

@@ -25,7 +25,7 @@ pub const MAX_FRAME: usize = MAX_DECODED + 2;
 /// Header flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Header flag: the body is a handshake, with a tag.
+/// Header flag: the body is a handshake, valid with a tag.
 const HANDSHAKE: u16 = 0x2000;
 
 /// Buffer for one encoded frame.
@@ -37,7 +37,7 @@ pub type FrameBuf = [u8; MAX_FRAME];
 pub struct Header {
     /// Number of the network, which separates chains.
     pub network: u16,
-    /// Node number: 0 Tx, 1 to N relays, N + 1 Rx.
+    /// Node number of the sender: 0 Tx, 1 to N relays, N + 1 Rx.
     pub sender: u16,
     /// Node number of the destination.
     pub destination: u16,

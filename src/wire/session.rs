@@ -61,7 +61,7 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference of one node's nonces in an epoch.
+/// Maximum difference of one node's nonces in an epoch. A larger one shows two nodes.
 const MAX_GAP: u32 = 1 << 12;
 
 /// Old handshakes in a row that are reported.
@@ -152,9 +152,9 @@ pub(crate) struct Session {
 /// Result of authenticating a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// New valid message; `first` in the session.
+    /// New valid message; `first` if the first proof of presence.
     Fresh { first: bool },
-    /// New handshake with this relay's nonce; `first` in the session.
+    /// New handshake with this relay's nonce; `first` if the first proof.
     Handshake { first: bool },
     /// Handshake without this relay's nonce: perhaps a recording.
     Unproven,
@@ -196,7 +196,7 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to node `to`, unproved until then.
+    /// Schedules a handshake to `to`, whose presence is unproved until it replies.
     pub(crate) fn greet(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -205,7 +205,7 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes; nonces count up from `claim` or more.
+    /// Forgets all nodes; nonces count up from `claim` or the last one.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.last_number {
             self.claim = claim;
@@ -382,7 +382,7 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns who sent `frame` with this relay's number.
+    /// Returns who sent `frame`, which has this relay's number.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
@@ -475,7 +475,8 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch are of two nodes. They differ by more than [`MAX_GAP`], without [`RAISED`].
+/// Returns true if two nonces of one epoch are of two nodes. Their lower halves differ by more than [`MAX_GAP`],
+/// without [`RAISED`].
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > MAX_GAP

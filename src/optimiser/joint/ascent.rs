@@ -10,7 +10,7 @@ use super::outlook::Outlook;
 /// Fractions of the moves, tried until the chain improves.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move over the distance from the interferer.
+/// First *trust*: maximum move, divided by the distance from the interferer.
 const TRUST: f32 = 0.5;
 
 /// Smallest trust that allows a prediction.
@@ -19,7 +19,7 @@ const RESTRAINED: f32 = 0.05;
 /// Trust below which the improvement ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum length lost per ln(target SIR), in Tx-Rx distances. It is a divisor.
+/// Least assumed shortening per ln(target SIR), in Tx-Rx distances. It is a divisor.
 const LEAST_SLOPE: f32 = 0.3;
 
 /// First increase of the target's limit, in ln(SIR).

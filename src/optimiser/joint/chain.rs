@@ -95,7 +95,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude interpolated between fixed ones, m. Outside it stays if `level`, else falls to the lowest.
+    /// Returns the altitude interpolated between fixed ones, m. Outside them it is constant if `level`, else falls to
+    /// the lowest.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -226,7 +227,7 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of moves in memory; 0 without the feature `altitude`.
+/// Number of relays whose moves are in memory; 0 without `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 

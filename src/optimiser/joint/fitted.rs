@@ -161,13 +161,13 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Positions of an initial chain; relays done.
+    /// Choice of initial positions, after this many relays.
     Begin(u16),
-    /// Forward, to the fastest moves: next node, 1 to N + 1 (Rx).
+    /// Search forward for the fastest moves, at this node.
     Pass(u16),
-    /// Backward, by the best moves: next relay, index in [`MOVES`].
+    /// Move of the relays from this one back; index in [`MOVES`].
     Back(u16, u8),
-    /// Sums of hop times, and the lowest SIR: next node.
+    /// Sum of the hop times, from this node on.
     Sum(u16),
 }
 

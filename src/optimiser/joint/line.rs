@@ -36,9 +36,9 @@ pub(super) struct Line {
     index: u16,
     /// True on the way from Rx back to Tx.
     is_back: bool,
-    /// True if some relay must stay short, or both directions count.
+    /// True if some relay cannot take its farthest x, or both directions count.
     holds_back: bool,
-    /// x of relay `index`, m; on the way back final.
+    /// x of relay `index`, m: farthest, or final on the way back.
     x_m: f32,
     /// Largest x with room for later relays, m.
     end_m: f32,
@@ -53,7 +53,7 @@ impl Line {
         end_m: 0.0,
     };
 
-    /// Continues Algorithm 1 for `sigma`, in ln(SIR); `None` if it is missed. True if some relay must stay short of its
+    /// Continues Algorithm 1 for `sigma`, in ln(SIR); `None` if it is missed. True if some relay cannot take its
     /// farthest x.
     pub(super) fn step<const RELAYS: usize>(
         &mut self,

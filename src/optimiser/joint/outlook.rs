@@ -65,8 +65,8 @@ impl Outlook {
         }
     }
 
-    /// Changes to the sender's value function; returns the receiver's move. It is within [`low`, `high`], m, relative
-    /// to now.
+    /// Becomes the sender's value function; returns the receiver's move. It is within [`low`, `high`], m, relative to
+    /// now.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,

@@ -13,7 +13,7 @@ use crate::place::{CrossSection, Placement};
 use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
-/// Used part of a hop's squared maximum length; covers rounding.
+/// Used part of a hop's squared maximum length; the rest covers rounding.
 const RIM: f32 = 0.999_99;
 
 /// Factor on the minimum separation; covers rounding.

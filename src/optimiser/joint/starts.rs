@@ -16,13 +16,13 @@ use crate::sir::square;
 pub(super) enum Start {
     /// Parabola: lateral offset and height of its middle, in half Tx-Rx distances.
     Arch { aside: f32, up: f32 },
-    /// Spiral about the interferer through a point in direction (`aside`, `up`). `far` is its distance, relative to Tx
-    /// and Rx.
+    /// Spiral about the interferer through a point in direction (`aside`, `up`). `far` is its distance divided by
+    /// `sqrt(r_Tx r_Rx)`, those of Tx and Rx.
     Around { aside: f32, up: f32, far: f32 },
     /// Parabola without a separation. Hops are as in flight.
     Through { aside: f32, up: f32 },
-    /// Parabola, seen from above, through the fixed altitudes. Outside them altitudes stay if `level`, else fall to the
-    /// lowest.
+    /// Parabola, seen from above, through the fixed altitudes; `aside` as in `Arch`. Outside them altitudes stay if
+    /// `level`, else fall to the lowest.
     FixedAltitudes { aside: f32, level: bool },
     /// Zigzag at the highest corner away from the interferer. For relays that do not fit one behind the other.
     Turns,
@@ -241,7 +241,7 @@ impl Start {
 /// Bisection for the highest feasible target, in ln(SIR).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest feasible target, ln(SIR); true if relays must stay short.
+    /// Highest feasible target, ln(SIR). True if some relays cannot take their farthest x.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -275,8 +275,8 @@ impl Seek {
         }
     }
 
-    /// Records a tried target; true if another has to be tried. `met`: `None` if infeasible, true if some relays must
-    /// stay short.
+    /// Records a tried target; true if another has to be tried. `met`: `None` if infeasible, true if some relays cannot
+    /// take their farthest x.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -302,7 +302,7 @@ impl Seek {
         true
     }
 
-    /// Returns the highest feasible target, ln(SIR), if any. True if some relays must stay short.
+    /// Returns the highest feasible target, ln(SIR), if any. True if some relays cannot take their farthest x.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }

@@ -62,7 +62,7 @@ pub enum Message {
     Verdict(SweepVerdict),
     /// Reply to a repeated message: there is no result yet.
     Busy {
-        /// Number of the message, or the view's hash.
+        /// Number of the message in progress, or the view's hash.
         number: u16,
     },
     /// Heartbeat request, reply, or both, in either direction.
@@ -119,7 +119,7 @@ pub enum Message {
     },
     /// Claim to the own node number, or another's echo.
     Claim(Claim),
-    /// Request for all relays' reports, away from the ground station.
+    /// Request for all relays' reports, from the ground station.
     Watch {
         /// Number of the request, wrapping; it rises every five seconds.
         number: u16,
@@ -245,7 +245,7 @@ impl Message {
     ///
     /// # Errors
     /// [`MessageError::Encoding`] unless it is one message in its shortest form. [`MessageError::Value`] for a number
-    /// out of range.
+    /// out of range, or a missing feature.
     #[inline(never)]
     pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
         let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;

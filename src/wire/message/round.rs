@@ -135,7 +135,7 @@ pub struct SweepVerdict {
     pub verdict: Verdict,
     /// x that the destination must take, m. `None` for its farthest x.
     pub required_x_m: Option<f32>,
-    /// True if some relay has an own power or altitude.
+    /// True if this or a later relay has an own power or altitude.
     pub own: bool,
 }
 
@@ -188,7 +188,7 @@ pub struct OwnSeat {
 /// Profiles of relays, by rising index.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Altitudes and powers of relays. In a reply of all relays.
+/// Altitudes and powers of relays: those so far, or all in a reply.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the collection, rising and wrapping.

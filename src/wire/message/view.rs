@@ -29,7 +29,8 @@ pub struct Poll {
     pub agreed: View,
     /// Number of votes by members of `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of `agreed` (or the leader) has voted. Half of the votes are then a quorum.
+    /// True if the proposer of `agreed` has voted (the leader for the initial view). Half of the votes are then a
+    /// quorum.
     pub proposer: bool,
     /// Longest remaining lease without a vote, in 0.1 s.
     pub lease_left: u16,
@@ -275,7 +276,7 @@ pub struct Orders {
     pub leaver: u16,
     /// Node that is called to join, 0 for none.
     pub joiner: u16,
-    /// True if all relays were at their positions.
+    /// True if all relays were at their positions at the last renewal.
     pub in_place: bool,
 }
 
@@ -287,7 +288,7 @@ impl Orders {
     };
 }
 
-/// Requests to leave or join.
+/// Requests to leave or join, from the last relay up to the sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
@@ -297,7 +298,7 @@ pub struct Requests {
     pub endurance_s: u16,
     /// Node that would join, 0 for none.
     pub spare: u16,
-    /// True if these relays are at their positions.
+    /// True if all relays from the last to the sender are in place.
     pub in_place: bool,
 }
 

@@ -197,6 +197,6 @@ pub(super) struct Derivatives {
     pub(super) by_to: [Triple; 2],
     pub(super) bend_from: Symmetric,
     pub(super) bend_to: Symmetric,
-    /// Part of `bend_...` from the length; the mixed ones negated.
+    /// Part of `bend_...` from the hop's length. The mixed derivatives are its negative.
     pub(super) bend: Symmetric,
 }

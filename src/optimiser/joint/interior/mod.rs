@@ -49,9 +49,9 @@ const LAST_MU: f32 = 1e-4;
 /// Factor by which the barrier weight falls.
 const LESS: f32 = 0.3;
 
-/// Increase of merit / mu that ends a weight, after half a step.
+/// Least increase of merit / mu that keeps mu, over half a step.
 const SETTLED: f32 = 0.1;
-/// Increase of merit / mu that ends a weight, after any step.
+/// Least increase of merit / mu that keeps mu, any step.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
@@ -157,17 +157,17 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Levels at the tried positions; next hop.
+    /// Computation of the levels, from this hop on.
     Levels(u16),
-    /// Target from all levels; Newton steps done.
+    /// Newton steps for the target, this many done.
     Target(u8),
-    /// Sum of the merit, which decides; next hop.
+    /// Sum of the merit, from this hop on.
     Merit(u16),
-    /// Storage of accepted positions and multipliers; next hop.
+    /// Storage of accepted positions and multipliers, from this hop on.
     Accept(u16),
-    /// Elimination of all relays; next segment.
+    /// Elimination of all relays, from this segment on.
     Eliminate(u16),
-    /// Newton steps: next segment, true for its second part. The second part comes first.
+    /// Newton steps of this segment; true for its second part. The second part comes first.
     Substitute(u16, bool),
 }
 

@@ -42,7 +42,7 @@ pub(super) struct Front {
     taken: Triple,
 }
 
-/// Equation of an eliminated relay: next relay's x, y, h; constant; per target change.
+/// Coefficients: next relay's x, y, h; constant; change of the target.
 type Row = [f32; 5];
 
 /// Equations of an eliminated relay, for its Newton step.

@@ -27,7 +27,7 @@ use core::task::Poll;
 /// Number of relays per call that get initial positions.
 const PUT: u16 = 20;
 
-/// Part of the way to even spacing before a run; first, repeated. It separates relays at the same x.
+/// Parts of the way to even spacing: first run, repeated runs. They separate relays at the same x.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Initial chain, told from the end with more power.
@@ -48,7 +48,8 @@ enum Along {
     Line,
     /// Evenly spaced from first to last x, as fractions from the stronger end.
     Even([f32; 2]),
-    /// x from Algorithm 1 without the excluded ones; a falling ellipse. See `close_beyond`.
+    /// x from Algorithm 1 except those of `close_beyond`. Offsets and altitudes follow an ellipse down to the weaker
+    /// end.
     Arc,
 }
 
@@ -109,13 +110,13 @@ enum Purpose {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Initial lateral offsets and altitudes; relays done.
+    /// Choice of initial offsets and altitudes, after this many relays.
     Begin(u16),
     /// Highest target that Algorithm 1 meets.
     Seek(Seek, Purpose),
     /// Relays' x by Algorithm 1 for this target, in ln(SIR).
     Settle(f32),
-    /// Start of the interior-point method; relays done.
+    /// Choice of starting positions, after this many relays.
     Put(u16),
     Interior,
 }
@@ -375,5 +376,5 @@ const NEW: f32 = 3e-4;
 /// Maximum number of repeated interior-point runs per initial chain.
 const AGAIN: u8 = 4;
 
-/// Start of the search above the result, in ln(SIR): its error.
+/// First target above the last run's, in ln(SIR): its possible error.
 const ABOVE: f32 = 1e-4;

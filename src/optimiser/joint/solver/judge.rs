@@ -43,7 +43,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 
     /// Records the result of the tried target; selects the next work. `met`: `None` if infeasible, true if some relays
-    /// must stay short.
+    /// cannot take their farthest x.
     pub(super) fn tried(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,

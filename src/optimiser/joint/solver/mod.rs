@@ -81,16 +81,16 @@ enum Purpose {
     Tighten,
     /// Highest target of an improved chain, with margins.
     Judge,
-    /// Highest target of an improved chain, as in flight.
+    /// Highest target of an improved chain, with hops as in flight.
     Last,
-    /// Check against the upper bound, as in flight.
+    /// Check against the upper bound, with hops as in flight.
     Probe,
-    /// Check of one relay's move, as in flight.
+    /// Check of one relay's move, with hops as in flight.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if hops are exactly as in flight. Relays may then stay short of their farthest positions.
+    /// Returns true if hops are exactly as in flight. Relays may then stop before their farthest x.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -124,7 +124,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     line: Line,
     /// x of each relay and its limit, m.
     notes: [[f32; 2]; RELAYS],
-    /// True if some relays must stay short.
+    /// True if some relays cannot take their farthest x.
     holds_back: bool,
     /// True if the minimum separation restricted any improvement.
     walled: bool,
@@ -282,7 +282,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solved.map_or(0.0, |(chain, cells)| cells.end_m(&chain, index))
     }
 
-    /// Returns true if some relays must stay short.
+    /// Returns true if some relays cannot take their farthest x.
     pub const fn holds_back(&self) -> bool {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,
