@@ -1,7 +1,8 @@
 //! Path loss of every kind of link.
 //!
-//! Received power is transmit power / (mu d^2), with d the distance in metres (the paper's path-loss exponent of 2) and mu = C (4
-//! pi f / c)^2. C is the excess loss by shadowing and scattering; it has one value with line of sight and one without.
+//! Received power is transmit power / (mu d^2), with d the distance in metres (the paper's path-loss exponent of 2) and
+//! mu = C (4 pi f / c)^2. C is the excess loss by shadowing and scattering; it has one value with line of sight and one
+//! without.
 
 use core::f64::consts::PI;
 

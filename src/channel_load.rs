@@ -1,11 +1,11 @@
 //! Minimum data rate and timing of a radio channel that relays share.
 //!
-//! An idle chain sends keep-alive traffic: every half of `probe_after` a lease renewal travels to its end and back, and within
-//! `probe_after` each neighbour may request a heartbeat and receive the reply. So each pair of neighbours sends at most eight
-//! frames of about 32 bytes in `probe_after`. When a neighbour is silent, heartbeat requests are eight times as frequent, lost
-//! frames are retransmitted, and sweeps of 108 bytes travel along the chain. The eight frames may therefore take 15 % of the
-//! channel. A channel with a higher load collapses when all relays are switched on, because a relay that waits for the channel
-//! longer than its retransmission timer sends again.
+//! An idle chain sends keep-alive traffic: every half of `probe_after` a lease renewal travels to its end and back, and
+//! within `probe_after` each neighbour may request a heartbeat and receive the reply. So each pair of neighbours sends
+//! at most eight frames of about 32 bytes in `probe_after`. When a neighbour is silent, heartbeat requests are eight
+//! times as frequent, lost frames are retransmitted, and sweeps of 108 bytes travel along the chain. The eight frames
+//! may therefore take 15 % of the channel. A channel with a higher load collapses when all relays are switched on. A
+//! relay that waits longer than its retransmission timer then sends again.
 //!
 //! | input | unit |
 //! | --- | --- |
@@ -14,8 +14,8 @@
 //! | `overhead` | cost of a frame beyond its bytes (preamble, turnaround), in bytes |
 //! | `probe_after` | s, as [`Settings::probe_after`](crate::Settings::probe_after) |
 //!
-//! The figures come from chains simulated with carrier sense: up to a hundred relays in one range without losses, twenty with 30
-//! % loss.
+//! The figures come from chains simulated with carrier sense: up to a hundred relays in one range without losses,
+//! twenty with 30 % loss.
 
 use crate::time::Duration;
 use crate::wire::MAX_SWEEP;

@@ -113,7 +113,7 @@ pub enum Event {
     /// A newer mission was rejected; this relay keeps its present one.
     ///
     /// The ground station is informed. The mission's distance does not fit its Tx and Rx positions on earth, or it
-    /// exceeds this relay's own geofence, or the settings do not allow its fitted slots. Upload a mission without this
+    /// exceeds this relay's own geofence, or the settings do not allow its time slots. Upload a mission without this
     /// error. Raised once for each such mission.
     UploadRefused {
         /// Reason for the rejection.
@@ -155,7 +155,7 @@ pub enum Event {
     ///
     /// See `Relay::set_reserve`. Raised again every minute while that lasts.
     AtReserve,
-    /// Permission of this relay: a node outside the chain may fly away.
+    /// Permission to fly away, given to a node outside the chain.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event
     /// may be repeated.

@@ -122,9 +122,9 @@ pub enum LineError {
     Lateral,
     /// The distance from Tx to Rx exceeds the relay's own geofence.
     Length,
-    /// The relay cannot fly the fitted slots (`fitted_gap` above 0).
+    /// The relay cannot fly time slots as long as hops need (`fitted_gap`).
     ///
-    /// Fitted slots need the method `Joint`, no `Settings::listen`, and a known interferer.
+    /// They need the method `Joint`, no `Settings::listen`, and a known interferer.
     Slots,
 }
 

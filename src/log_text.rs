@@ -1,4 +1,5 @@
-//! Texts that `defmt` prints for events and their reasons. An image stores their numbers only, so the texts take no flash.
+//! Texts that `defmt` prints for events and their reasons. An image stores their numbers only, so the texts take no
+//! flash.
 
 #![expect(
     clippy::match_same_arms,

@@ -201,7 +201,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns true if these settings allow the slots of `config`. Fitted slots need `Joint` and a known interferer.
+    /// Returns true if these settings allow the time slots of `config`. Unequal slots need `Joint` and a known
+    /// interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;
@@ -322,9 +323,9 @@ pub enum SetupError {
     ///
     /// With traffic in both directions this method needs a known interferer.
     Reverse,
-    /// Fitted slots (`fitted_gap`) without method Joint or a known interferer.
+    /// Time slots as long as hops need, without Joint or a known interferer.
     ///
-    /// With `listen` set, the interferer counts as unknown.
+    /// They are set by the mission's `fitted_gap`. With `listen`, the interferer counts as unknown.
     Fitted,
     /// `method.explore_m` is not within 0 to 1e5, or its grid is too small.
     ///

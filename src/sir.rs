@@ -1,12 +1,12 @@
 //! Signal-to-interference ratio (SIR) of every kind of hop. These formulas are defined only here.
 //!
 //! With receiver noise N the ratio is the SINR, signal over I + N. A relay at the squared distance s, m^2, from the
-//! interferer receives I = P / (eta s), and I + N = P (1 + nu s) / (eta s) with nu = N eta / P. So [`quiet`] becomes s
-//! / (1 + nu s), and nothing else changes. In an interference field the factor Upsilon includes the noise (see
+//! interferer receives I = P / (eta s). So I + N = P (1 + nu s) / (eta s) with nu = N eta / P. So [`quiet`] becomes s /
+//! (1 + nu s), and nothing else changes. In an interference field the factor Upsilon includes the noise (see
 //! [`Field`](crate::field::Field)); for the hop to Rx the factor K does.
 //!
-//! The SIR of a chain is that of its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
-//! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
+//! The SIR of a chain is that of its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple
+//! UAVs"). All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
 //! `host-tests/tests/placement/main.rs`.
 
 use crate::mission::{Interferer, Mission};

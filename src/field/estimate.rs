@@ -1,18 +1,18 @@
 //! Estimator of Upsilon at one position from measured interference powers.
 //!
-//! u = I / `I_max` has a Beta distribution, as in the paper, whose shapes follow from the mean m and the variance v of the
-//! samples:
+//! u = I / `I_max` has a Beta distribution, as in the paper, whose shapes follow from the mean m and the variance v of
+//! the samples:
 //!
 //! ```text
 //! w = m (1 - m) / v - 1,    alpha = m w,    beta = (1 - m) w,    Upsilon = (1 + beta / (alpha - 1)) / I_max
 //! ```
 //!
-//! We use moments and not maximum likelihood, because the latter needs two logarithms a sample and digamma functions at the end.
-//! From alpha = 3 on it is at most 8 % more accurate; at alpha = 1.5 it would be 6 to 28 %. The samples' mean of 1 / I would need
-//! no fit, but has an infinite variance for alpha <= 2.
+//! We use moments and not maximum likelihood, because the latter needs two logarithms a sample and digamma functions at
+//! the end. From alpha = 3 on it is at most 8 % more accurate; at alpha = 1.5 it would be 6 to 28 %. The samples' mean
+//! of 1 / I would need no fit, but has an infinite variance for alpha <= 2.
 //!
-//! The standard error uses the delta method: with z1 the error of m in units of sqrt(v) and z2 that of v in units of v, n Var(z1)
-//! = 1, n Cov = skewness and n Var(z2) = 2 + excess kurtosis, those of the fitted Beta distribution, and
+//! The standard error uses the delta method: with z1 the error of m in units of sqrt(v) and z2 that of v in units of v,
+//! n Var(z1) = 1, n Cov = skewness and n Var(z2) = 2 + excess kurtosis, those of the fitted Beta distribution, and
 //!
 //! ```text
 //! d alpha / d z1 = sqrt(v) w + m (1 - 2m) / sqrt(v)        d alpha / d z2 = -m (w + 1)
@@ -20,12 +20,12 @@
 //! d ln(beta / (alpha - 1)) / d z2 = (w + 1) / (w (alpha - 1))
 //! ```
 //!
-//! Upsilon grows without limit as alpha falls to 1, which a derivative does not show. So the error is divided by 1 - 2 s, with s
-//! the standard error of alpha over alpha - 1. Two standard errors above the estimate is then the Upsilon of an alpha two of
-//! *its* standard errors lower, and if that alpha is 1 there is no estimate.
+//! Upsilon grows without limit as alpha falls to 1, which a derivative does not show. So the error is divided by 1 - 2
+//! s, with s the standard error of alpha over alpha - 1. Two standard errors above the estimate is then the Upsilon of
+//! an alpha two of *its* standard errors lower, and if that alpha is 1 there is no estimate.
 //!
-//! The sums are integers, so no sample is too small for its sum, and the variance does not cancel. The accuracy is asserted in
-//! `host-tests/tests/field/estimation.rs`.
+//! The sums are integers, so no sample is too small for its sum, and the variance does not cancel. The accuracy is
+//! asserted in `host-tests/tests/field/estimation.rs`.
 
 use super::is_upsilon;
 use crate::root::sqrt;

@@ -1,18 +1,19 @@
 //! Field with receiver noise: the effective Upsilon.
 //!
-//! With noise of N watts a watt of signal is worth E[1 / (I + N)] at x. A field only has Upsilon = E[1 / I], without the variance
-//! of I. At each point of the table this module uses
+//! With noise of N watts a watt of signal is worth E[1 / (I + N)] at x. A field only has Upsilon = E[1 / I], without
+//! the variance of I. At each point of the table this module uses
 //!
 //! ```text
 //! Upsilon_N = 1 / (1 / Upsilon + N) = Upsilon / (1 + N Upsilon)
 //! ```
 //!
-//! and between two points a straight line, as without noise. So 1 / SINR = 1 / E(SIR) + 1 / SNR. This equals E[1 / (I + N)] if I
-//! is constant, and is an **upper bound** of it otherwise: with u = 1 / I, 1 / (I + N) = u / (1 + N u), whose second derivative
-//! -2 N / (1 + N u)^3 is below 0, so by Jensen's inequality E[u / (1 + N u)] <= E[u] / (1 + N E[u]). Upsilon alone gives no lower
-//! bound above 0: u = Upsilon / p with the probability p, and otherwise nearly 0, has this Upsilon, and E[u / (1 + N u)] falls
-//! with p. If the mean of I is known, 1 / (E[I] + N) is a lower bound, because 1 / (I + N) is convex in I. The error of the bound
-//! for Beta distributions: `noise_in_a_field_is_bounded_from_above` in `host-tests/tests/noise/field.rs`.
+//! and between two points a straight line, as without noise. So 1 / SINR = 1 / E(SIR) + 1 / SNR. This equals E[1 / (I +
+//! N)] if I is constant, and is an **upper bound** of it otherwise: with u = 1 / I, 1 / (I + N) = u / (1 + N u), whose
+//! second derivative -2 N / (1 + N u)^3 is below 0, so by Jensen's inequality E[u / (1 + N u)] <= E[u] / (1 + N E[u]).
+//! Upsilon alone gives no lower bound above 0: u = Upsilon / p with the probability p, and otherwise nearly 0, has this
+//! Upsilon, and E[u / (1 + N u)] falls with p. If the mean of I is known, 1 / (E[I] + N) is a lower bound, because 1 /
+//! (I + N) is convex in I. The error of the bound for Beta distributions: `noise_in_a_field_is_bounded_from_above` in
+//! `host-tests/tests/noise/field.rs`.
 //!
 //! A relay that measures needs no bound: its receiver measures I + N, so its estimate is E[1 / (I + N)].
 

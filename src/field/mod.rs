@@ -1,8 +1,9 @@
 //! Interference field: interference that is known as a distribution along x, not by its source.
 //!
-//! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times Upsilon(x) = E[1
-//! / I(x)], in 1/W; placement needs nothing else of the distribution. A [`Field`] is a table of Upsilon along x. If I / `I_max`
-//! has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; from measurements, [`estimate::Estimator`] fits one.
+//! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times
+//! Upsilon(x) = E[1 / I(x)], in 1/W; placement needs nothing else of the distribution. A [`Field`] is a table of
+//! Upsilon along x. If I / `I_max` has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; from
+//! measurements, [`estimate::Estimator`] fits one.
 
 pub mod estimate;
 mod in_noise;
@@ -204,11 +205,11 @@ pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
 impl FieldPoint {
     /// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution.
     ///
-    /// It is (alpha + beta - 1) / ((alpha - 1) `i_max_w`), with the shapes `alpha` and `beta`, and the maximum power
-    /// `i_max_w`, W. The paper's I is relative to `I_max`. `None` unless alpha > 1 (otherwise E[1/I] is infinite), beta
-    /// > 0, `i_max_w` > 0, and all three and the result are finite. It uses f64: near alpha = 1 an f32 is too coarse.
-    /// It is for constants, without run time. Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in
-    /// `host-tests/tests/field/closed_forms.rs`.
+    /// It is `(alpha + beta - 1) / ((alpha - 1) i_max_w)`, with the shapes `alpha` and `beta`, and the maximum power
+    /// `i_max_w`, W. The paper's I is relative to `I_max`. `None` unless `alpha > 1` (otherwise E[1/I] is infinite),
+    /// `beta > 0`, `i_max_w > 0`, and all three and the result are finite. It uses f64: near alpha = 1 an f32 is too
+    /// coarse. It is for constants, without run time. Accuracy:
+    /// `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
     pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
         let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
         if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {

@@ -1,7 +1,7 @@
 //! Mission: everything that the relays must know alike before flight, validated once.
 //!
-//! [`MissionConfig`] has the parameters as plain numbers, and [`MissionError`] names a rejected one; a [`Mission`] has checked parameters, and
-//! quantities derived from them.
+//! [`MissionConfig`] has the parameters as plain numbers, and [`MissionError`] names a rejected one; a [`Mission`] has
+//! checked parameters, and quantities derived from them.
 
 use crate::channel::Channel;
 use crate::features::{ALTITUDE, FIELD, NOISE, REVERSE};
@@ -68,7 +68,7 @@ pub struct MissionConfig {
     ///
     /// Without effect if `reverse` is 0.
     pub rx_power_w: f32,
-    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots.
+    /// SNR gap, linear: 1 to 1000; 0 for equal time slots.
     ///
     /// With a gap, each time slot is as long as its hop needs. The joint method then maximises the data rate. A hop's
     /// spectral efficiency is log2(1 + SINR / gap).
@@ -284,7 +284,7 @@ impl Band {
         within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
     }
 
-    /// Returns true for a valid lateral range: ordered, with 0, -1e5 to 1e5 m.
+    /// Returns true for a valid lateral range: ordered, including 0, -1e5 to 1e5 m.
     pub(super) const fn is_room_beside(self) -> bool {
         within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
     }
@@ -597,7 +597,7 @@ impl Mission {
         }
     }
 
-    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots.
+    /// Returns the SNR gap, linear; 0 for equal time slots.
     ///
     /// 0 while the interferer is unknown. Constant without the feature `altitude`.
     pub const fn fitted_gap(&self) -> f32 {
@@ -660,7 +660,8 @@ impl Mission {
     /// Returns the gain A of the first hop.
     ///
     /// The hop's SIR is A times the inverse interference ([`crate::sir::quiet`]), divided by the squared length. With
-    /// one interferer A is `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
+    /// one interferer A is `p_t` / `p_MSI`, the powers of Tx and interferer. In an interference field A is `p_t`
+    /// `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
@@ -669,9 +670,9 @@ impl Mission {
     /// Returns the gain of a hop from a relay of `power_w` watts to another drone.
     ///
     /// The hop's SIR is the gain times the inverse interference ([`crate::sir::quiet`]), divided by the squared length.
-    /// With one interferer the gain is (`p_u` / `p_MSI`) (eta / `mu_los`). eta and `mu_los` are the path-loss factors
-    /// drone to ground and drone to drone. In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the
-    /// largest E[1/I].
+    /// With one interferer the gain is (`p_u` / `p_MSI`) (eta / `mu_los`). `p_u` and `p_MSI` are the powers of relay
+    /// and interferer, eta and `mu_los` the path-loss factors drone to ground and drone to drone. In an interference
+    /// field it is `p_u` `Upsilon_max` / `mu_los`, with the largest E[1/I].
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
@@ -826,7 +827,7 @@ impl Mission {
     }
 }
 
-/// Far substitute for an unknown interferer: equal everywhere, to 1e-7.
+/// Substitute far away for an unknown interferer: equal everywhere, to 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,

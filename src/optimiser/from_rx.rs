@@ -1,7 +1,8 @@
 //! Hop from Rx to the last relay: the largest x at which this relay receives Rx well enough.
 //!
-//! Rx sends, and relay N receives at x. With d = D - x this is a first hop seen from Rx, with the interferer at D - X, the gain
-//! A_rx of Rx's power and the target r gamma, in the notation of [`reverse`](super::reverse). With e, C and H of [`spacing`](super::spacing)
+//! Rx sends, and relay N receives at x. With d = D - x this is a first hop seen from Rx, with the interferer at D - X,
+//! the gain A_rx of Rx's power and the target r gamma, in the notation of [`reverse`](super::reverse). With e, C and H
+//! of [`spacing`](super::spacing)
 //!
 //! ```text
 //! f(d) = -e d^2 - 2 u d + C >= 0,    u = D - X
@@ -18,12 +19,12 @@
 //! | <= 0 | >= 0 | (u + r) / -e, the upper one |
 //! | <= 0 | < 0 | C / (u - r), the upper one |
 //!
-//! with r = sqrt(rho u^2 + e H) as there, none if the discriminant is negative. In each row both terms of the denominator have
-//! the same sign. With noise the root is the last one of the mirrored function g(-d), which the search of
-//! [`noisy_hop`](super::noisy_hop) finds. The other relays stay at that x too if their reaches are beyond it.
+//! with r = sqrt(rho u^2 + e H) as there, none if the discriminant is negative. In each row both terms of the
+//! denominator have the same sign. With noise the root is the last one of the mirrored function g(-d), which the search
+//! of [`noisy_hop`](super::noisy_hop) finds. The other relays stay at that x too if their reaches are beyond it.
 //!
-//! If relay N - 1 does not reach that x with data toward Rx, relay N goes to the largest x below that it does reach,
-//! and so on.
+//! Relay N - 1 may not reach that x with data toward Rx. Relay N then goes to the largest x below that relay N - 1 does
+//! reach, and so on.
 //!
 //! Accuracy: `host-tests/tests/both_ways` compares chains with a grid search in f64.
 

@@ -1,9 +1,9 @@
 //! Ladder: the target SIRs of one pass along the chain (a sweep), encoded in six bytes.
 //!
-//! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j - 7|. So a
-//! ladder is dense near the expected optimum and still spans the whole bracket. It is computed from target 7 in both directions,
-//! so that rounding errors are largest at the ends. Every relay computes the targets from the six bytes with the same f32
-//! operations, hence to the same bits.
+//! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j -
+//! 7|. So a ladder is dense near the expected optimum and still spans the whole bracket. It is computed from target 7
+//! in both directions, so that rounding errors are largest at the ends. Every relay computes the targets from the six
+//! bytes with the same f32 operations, hence to the same bits.
 
 use super::PerTarget;
 use crate::root::sqrt;

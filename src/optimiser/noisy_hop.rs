@@ -1,16 +1,17 @@
 //! Reach of a hop with receiver noise: a bounded search on intervals of known curvature.
 //!
-//! In the notation of [`spacing`](super::spacing), with rho = gamma / A, s(d) = (d - u)^2 + a^2 the squared distance from the interferer,
-//! l(d) = d^2 + b^2 that from the sender, and nu = N eta / P the noise over the interferer's power received at 1 m, the
-//! interference P / (eta s) becomes P / (eta s) + N, and so
+//! In the notation of [`spacing`](super::spacing), with rho = gamma / A, s(d) = (d - u)^2 + a^2 the squared distance
+//! from the interferer, l(d) = d^2 + b^2 that from the sender, and nu = N eta / P the noise over the interferer's power
+//! received at 1 m, the interference P / (eta s) becomes P / (eta s) + N, and so
 //!
 //! ```text
 //! SINR = A s / (l (1 + nu s)) >= gamma   <=>   g(d) = q(s(d)) - rho l(d) >= 0,    q(s) = s / (1 + nu s)
 //! ```
 //!
-//! which times 1 + nu s is a quartic in d. Only its last root before `high` is needed, and the search finds it from above. One
-//! bound is the noise-free reach, since a target that is missed without noise is missed with it; the other is the SNR alone, rho
-//! nu l <= 1. Where SINR only falls with d, the smaller bound is within a factor of sqrt(2) of the root.
+//! which times 1 + nu s is a quartic in d. Only its last root before `high` is needed, and the search finds it from
+//! above. One bound is the noise-free reach, since a target that is missed without noise is missed with it; the other
+//! is the SNR alone, rho nu l <= 1. Where SINR only falls with d, the smaller bound is within a factor of sqrt(2) of
+//! the root.
 //!
 //! **Curvature.** With w = 1 + nu s, v = 1 + nu a^2 and t = d - u
 //!
@@ -18,22 +19,23 @@
 //! g'' / 2 = (v - 3 nu t^2) / w^3 - rho
 //! ```
 //!
-//! falls with |t| where it is above 0. So g is concave everywhere if rho v^2 >= 1; otherwise it is convex within T of the
-//! interferer, and concave before and beyond. At T, w is the root of rho w^3 + 3 w = 4 v. The left side rises, so there is one
-//! root, found from 4 v / 3 by Newton's method from above.
+//! falls with |t| where it is above 0. So g is concave everywhere if rho v^2 >= 1; otherwise it is convex within T of
+//! the interferer, and concave before and beyond. At T, w is the root of rho w^3 + 3 w = 4 v. The left side rises, so
+//! there is one root, found from 4 v / 3 by Newton's method from above.
 //!
 //! **Search**, from the right, on at most three intervals, each of which starts where g < 0:
 //!
-//! - On a concave interval Newton's tangents from the right are above g, so no step passes the last root, and the first step that
-//!   does not fall or leaves the interval proves that there is none.
-//! - On the convex interval g has a root if and only if g >= 0 at its left end, and then exactly one. Newton's tangents from the
-//!   left are below g, so no step passes it; each step is at least a bisection step.
+//! - On a concave interval Newton's tangents from the right are above g, so no step passes the last root. The first
+//!   step that does not fall, or leaves the interval, proves that there is none.
+//! - On the convex interval g has a root if and only if g >= 0 at its left end, and then exactly one. Newton's tangents
+//!   from the left are below g, so no step passes it; each step is at least a bisection step.
 //!
-//! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and rises with
-//! the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
+//! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and
+//! rises with the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in
+//! `host-tests/tests/noise/`.
 //!
-//! `closest` finds the shortest length instead, by the same search of the mirrored hop. Without noise it is the closed form in
-//! [`from_rx`](super::from_rx).
+//! `closest` finds the shortest length instead, by the same search of the mirrored hop. Without noise it is the closed
+//! form in [`from_rx`](super::from_rx).
 
 use crate::features::NOISE;
 use crate::root::sqrt;

@@ -6,13 +6,14 @@
 //! counts. So no chain that meets the target is excluded, and a missed target is out of reach of every chain. See
 //! [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may have to hold back.
 //!
-//! When the verdict travels back along the chain, each relay takes its position, and
-//! [`required_position`](Link::required_position) returns the position that the previous relay of the pass must take.
-//! In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
+//! When the verdict travels back along the chain, each relay takes its position.
+//! [`required_position`](Link::required_position) returns the position that the previous relay must take. In a *plain*
+//! pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
-//! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0 if the target is
-//! missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole
-//! chain for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
+//! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0
+//! if the target is missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit,
+//! if any. A `Walk` is a whole chain for one target, without messages: reaches from the leader to the last relay, and
+//! required positions on the way back.
 
 use core::iter::successors;
 
@@ -71,11 +72,11 @@ pub struct Link<'a> {
     pub plain: bool,
     /// Maximum x with room for later relays, m. Only in the joint method.
     pub end_m: Option<f32>,
-    /// Fixed x, m; `None` without fitted time slots.
+    /// Fixed x, m; `None` for equal time slots.
     pub fixed_m: Option<f32>,
 }
 
-/// Returns [`origin`](Self::origin) once for every target.
+/// Returns [`origin`] once for every target.
 pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }

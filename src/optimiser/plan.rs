@@ -1,7 +1,7 @@
 //! Whole chain from the mission alone, without messages: the radio-silent form of Algorithm 1.
 //!
-//! It uses the same functions as the relays, so its result equals the relays' agreement to the bit. The leader predicts with it,
-//! a radio-silent relay computes its own position, and so does a planner.
+//! It uses the same functions as the relays, so its result equals the relays' agreement to the bit. The leader predicts
+//! with it, a radio-silent relay computes its own position, and so does a planner.
 
 use super::PerTarget;
 use super::ladder::Ladder;

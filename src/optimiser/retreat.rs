@@ -1,14 +1,15 @@
 //! Maximum distance of a sender from its receiver in a field. Algorithm 4's steps back from Rx, in closed form.
 //!
-//! The receiver's position is known, and with it Upsilon. With the receiver at (x0, h0), its sender at (x0 - d, h) and A = p
-//! Upsilon(x0) / `mu_los` for a sender of p watts, E(SIR) >= gamma is
+//! The receiver's position is known, and with it Upsilon. With the receiver at (x0, h0), its sender at (x0 - d, h) and
+//! A = p Upsilon(x0) / `mu_los` for a sender of p watts, E(SIR) >= gamma is
 //!
 //! ```text
 //! d^2 <= A / gamma - (h - h0)^2
 //! ```
 //!
-//! This is the paper's eq. (num), for relays at different altitudes. For the last hop x0 = D, h0 = 0 and A = p Upsilon(D) / eta.
-//! The printed algorithm lets a position become negative; here a sender stops where there is just room for those before it.
+//! This is the paper's eq. (num), for relays at different altitudes. For the last hop x0 = D, h0 = 0 and A = p
+//! Upsilon(D) / eta. The printed algorithm lets a position become negative; here a sender stops where there is just
+//! room for those before it.
 //!
 //! The receiver need not be as close to Tx as possible: with less interference the hop may be longer. The positions of
 //! a relay from which the chain can be continued to Rx form a range [l, r], and the next range starts at
@@ -17,10 +18,11 @@
 //! l_k = min { y - d(y) : l_{k+1} <= y <= r_{k+1} }.
 //! ```
 //!
-//! Between two points of the field d(y)^2 = c Upsilon(y) - q with q = (h - h0)^2 is linear in y, so y - d(y) is convex where it
-//! is defined. Its minimum is at an end, where d falls to the minimum step, or where d'(y) = 1: d = c b / 2 with b the slope of
-//! Upsilon. `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/` compares it with grids of positions. If a minimum
-//! separation or a climb excludes some y, the ranges may have holes, and l_k is a bound.
+//! Between two points of the field d(y)^2 = c Upsilon(y) - q with q = (h - h0)^2 is linear in y, so y - d(y) is convex
+//! where it is defined. Its minimum is at an end, where d falls to the minimum step, or where d'(y) = 1: d = c b / 2
+//! with b the slope of Upsilon. `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/` compares it with
+//! grids of positions. If a minimum separation or a climb excludes some y, the ranges may have holes, and l_k is a
+//! bound.
 //!
 //! # Way back
 //!
@@ -31,8 +33,8 @@
 //! (y - x)^2 <= A' / gamma - q.
 //! ```
 //!
-//! Between two points of the field the right side is linear in x, so the margin is concave there, and the first x from which both
-//! directions work is a root of a quadratic.
+//! Between two points of the field the right side is linear in x, so the margin is concave there. The first x from
+//! which both directions work is a root of a quadratic.
 //!
 //! If x stays between two points of the field, and y too, each direction allows a convex set of pairs (x, y). So the
 //! smallest x has one of three kinds of y: the smallest or largest y of that part of the field, the y that is best for
@@ -43,8 +45,9 @@
 //! z^2 = c Upsilon(y) - q,    c Upsilon(y) = c' Upsilon(x).
 //! ```
 //!
-//! The second equation is linear in x and z, and leaves a quadratic for z. `longest` compares all these y. For a given x the set of y
-//! that both directions allow is exact: the y up to x + sqrt(A' / gamma - q). The y of a range that lie in a hole are refused.
+//! The second equation is linear in x and z, and leaves a quadratic for z. `longest` compares all these y. For a given
+//! x the set of y that both directions allow is exact: the y up to x + sqrt(A' / gamma - q). The y of a range that lie
+//! in a hole are refused.
 //!
 //! Accuracy: `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` compares with f64, and
 //! `the_best_places_in_a_field_are_found` in `host-tests/tests/both_ways/field.rs` compares chains with a grid search.

@@ -1,7 +1,7 @@
 //! Hop for data from Rx to Tx (the way back), and the combined reach of a hop in both directions.
 //!
-//! On the way back from Rx to Tx hop k is sent by node k and received by node k - 1, so another power and the interference at
-//! another position count. With node 0 = Tx, node N + 1 = Rx, the path gain g and the noise N
+//! On the way back from Rx to Tx hop k is sent by node k and received by node k - 1. So another power, and the
+//! interference at another position, count. With node 0 = Tx, node N + 1 = Rx, the path gain g and the noise N
 //!
 //! ```text
 //! F_k = P_(k-1) g / (I_k + N),    B_k = P_k g / (I_(k-1) + N),    SIR of the chain = min over k of min(F_k, B_k / r)
@@ -39,8 +39,9 @@
 //! s / s0 = 1 + c^2 - 2 c cos v
 //! ```
 //!
-//! by the law of cosines. It rises with x0, while x falls. So from the combined reach of M on, x is feasible up to one point, which a
-//! bisection finds. It is needed only if the way back limits the reach of M, and ends at once if a little more is infeasible.
+//! by the law of cosines. It rises with x0, while x falls. So from the combined reach of M on, x is feasible up to one
+//! point, which a bisection finds. It is needed only if the way back limits the reach of M, and ends at once if a
+//! little more is infeasible.
 //!
 //! Accuracy: `host-tests/tests/both_ways` compares chains with a grid search in f64.
 

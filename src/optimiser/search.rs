@@ -2,12 +2,12 @@
 //!
 //! It implements both schedules of Algorithm 1. The paper's schedule tries gamma_0, gamma_0 - epsilon, ..., one in each
 //! pass. The bracketed schedule tries a ladder of targets in each pass. A chain that meets a target also meets lower
-//! ones, so the optimum is between the highest target that was met and the lowest that was missed. The slacks are
+//! ones. So the optimum is between the highest target that was met and the lowest that was missed. The slacks are
 //! smooth in log gamma, so inverse interpolation places the dense middle of the next ladder. Its ends still span the
 //! *bracket*: the range of targets that may be the highest feasible one.
 //!
-//! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as met. All
-//! other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
+//! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as
+//! met. All other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
 //!
 //! A pass assumes that a relay's positions are an interval without holes. If a separation is binding there may be a
 //! hole, and a relay whose required position is in it refuses. Then a plain pass finds a target that no relay can

@@ -1,15 +1,15 @@
 //! Reach of a hop. The closed forms of the paper's `d_1`, `d_k` and `d_max` are one numerically stable rule.
 //!
-//! With the sender at (x0, y0, h0), the receiver at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's
-//! gain, SIR >= gamma is
+//! With the sender at (x0, y0, h0), the receiver at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the
+//! sender's gain, SIR >= gamma is
 //!
 //! ```text
 //! f(d) = -e d^2 - 2 u d + C >= 0,    e = gamma / A - 1,    C = u^2 + H,
 //! H = (Y - y0) (Y + y0 - 2y) + h0 (2h - h0) - e ((y - y0)^2 + (h - h0)^2)
 //! ```
 //!
-//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. It is `end` if f is not negative there, and otherwise the
-//! largest root inside, which depends on the signs of e, u and C:
+//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. It is `end` if f is not negative there, and otherwise
+//! the largest root inside, which depends on the signs of e, u and C:
 //!
 //! | C | u | largest root below `end` |
 //! | --- | --- | --- |
@@ -18,9 +18,9 @@
 //! | < 0 | < 0 and e > 0 | (r - u) / e, if inside |
 //! | < 0 | otherwise | none: the target is infeasible |
 //!
-//! with r = sqrt((gamma / A) u^2 + e H). The discriminant u^2 + e C is the same number, but cancels, and so does 1 + e for small
-//! targets. e is computed from a gain of twice f32's width, so targets close to A lose no digits. The printed case distinction
-//! selects wrong roots once the chain has passed the interferer.
+//! with r = sqrt((gamma / A) u^2 + e H). The discriminant u^2 + e C is the same number, but cancels, and so does 1 + e
+//! for small targets. e is computed from a gain of twice f32's width, so targets close to A lose no digits. The printed
+//! case distinction selects wrong roots once the chain has passed the interferer.
 //!
 //! If the sender may be anywhere in [0, x0], only the position closest to the receiver matters: it is received best,
 //! and the interference at the receiver does not depend on it. For a receiver at x up to x0 plus the minimum step s,
@@ -29,15 +29,18 @@
 //! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
 //! ```
 //!
-//! which is true except within w of the interferer. So if the target cannot be met from x0, the sender may *hold back* for a
-//! receiver at X - w: to climb before it comes near, or to leave the minimum step. `near_optimal_at_mixed_altitudes` and
-//! `near_optimal_with_a_separation` in `host-tests/tests/exact.rs` compare this with a search over all positions.
+//! which is true except within w of the interferer. So if the target cannot be met from x0, the sender may *hold back*
+//! for a receiver at X - w: to climb before it comes near, or to leave the minimum step.
+//! `near_optimal_at_mixed_altitudes` and `near_optimal_with_a_separation` in `host-tests/tests/exact.rs` compare this
+//! with a search over all positions.
 //!
 //! For the joint method `Hop::stretched` is the reach as a differentiable function.
 //!
-//! With receiver noise the reach has no closed form: [`noisy_hop`](super::noisy_hop) searches it, starting from this one.
+//! With receiver noise the reach has no closed form: [`noisy_hop`](super::noisy_hop) searches it, starting from this
+//! one.
 //!
-//! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection in f64.
+//! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection
+//! in f64.
 
 use super::noisy_hop::{HALVINGS, MOST_RATIO, NoisyHop, before, closest};
 use super::reverse::{Back, zone};

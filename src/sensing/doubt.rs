@@ -37,8 +37,8 @@
 //! | does not fit | does not fit, by the same factor | the path loss over the ground differs from the mission's: the receiver's level is used |
 //! | does not fit, or no level | does not fit, or another factor | a sensor is faulty or a hill is in the way: the receiver's level is used |
 //!
-//! At least three relays are required, consistent and more than the unknowns. A faulty end stays so until it fits or the other
-//! does not.
+//! At least three relays are required, consistent and more than the unknowns. A faulty end stays so until it fits or
+//! the other does not.
 
 use super::fit::Fit;
 use super::sums::Place;

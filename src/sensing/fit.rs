@@ -1,12 +1,12 @@
 //! Source estimate: a weighted least-squares fit of the sums, and its uncertainty.
 //!
-//! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is the residual of the
-//! sums over the positions beyond the unknowns. The operator's expectation is added with a weight of four positions, as few of
-//! them leave little residual.
+//! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is the residual
+//! of the sums over the positions beyond the unknowns. The operator's expectation is added with a weight of four
+//! positions, as few of them leave little residual.
 //!
-//! If no source fits, the closest one is searched on a grid, and on finer ones about its optimum. The coefficients of a source at
-//! (X', Y') are k g, g = (X'^2 + Y'^2 + 1/3, -2 X', 1, -2 Y'). The best k is m g / (g G g), with m the products with v, and the
-//! residual is smallest where (m g)^2 / (g G g) is largest. So the search has two dimensions.
+//! If no source fits, the closest one is searched on a grid, and on finer ones about its optimum. The coefficients of a
+//! source at (X', Y') are k g, g = (X'^2 + Y'^2 + 1/3, -2 X', 1, -2 Y'). The best k is m g / (g G g), with m the
+//! products with v, and the residual is smallest where (m g)^2 / (g G g) is largest. So the search has two dimensions.
 //!
 //! The symmetric positive 4 x 4 system is solved by L D L^T factorisation in f64; the last unknown may be omitted.
 

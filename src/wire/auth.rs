@@ -1,8 +1,8 @@
 //! Authentication of frames: the tag, and replay protection by counters.
 //!
-//! The tag is keyed BLAKE2s (RFC 7693) over the nonces of both ends, the header and the body, with a digest of eight bytes. We
-//! use a MAC and not a cipher, because anyone who sees the drones knows their positions, and because a MAC remains secure even if
-//! a counter is used twice, which a stream cipher does not.
+//! The tag is keyed BLAKE2s (RFC 7693) over the nonces of both ends, the header and the body, with a digest of eight
+//! bytes. We use a MAC and not a cipher, because anyone who sees the drones knows their positions. A MAC also remains
+//! secure if a counter is used twice; a stream cipher does not.
 
 use super::blake2s::mac;
 use crate::features::AUTH;

@@ -1,10 +1,11 @@
 //! Keyed BLAKE2s (RFC 7693), for tags of eight bytes.
 //!
-//! Implemented here because the available crates leave a panic in the image, or take more flash than `auth` may. In `blake2` 0.11
-//! an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too. With `size_opt` and
-//! `opt-level = 3` it takes 1.6 KB more, and 11 100 instead of 12 800 instructions for the tag of a full sweep; without
-//! `size_opt` 3.7 KB more and 4800 instructions. `hmac-sha256` indexes by tables too, and `hmac` with `sha2` takes several times
-//! the flash. The tests compare this implementation with `blake2`. No branch or address depends on key or message.
+//! Implemented here because the available crates leave a panic in the image, or take more flash than `auth` may. In
+//! `blake2` 0.11 an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too.
+//! With `size_opt` and `opt-level = 3` it takes 1.6 KB more, and 11 100 instead of 12 800 instructions for the tag of a
+//! full sweep; without `size_opt` 3.7 KB more and 4800 instructions. `hmac-sha256` indexes by tables too, and `hmac`
+//! with `sha2` takes several times the flash. The tests compare this implementation with `blake2`. No branch or address
+//! depends on key or message.
 
 const BLOCK: usize = 64;
 

@@ -1,9 +1,9 @@
 //! Wire format of frames and messages.
 //!
-//! [`deframe`] splits the byte stream and decodes COBS, [`frame`] has addresses and the CRC, [`message`] the messages, [`digest`]
-//! the digest of a mission, [`auth`] the authentication, `endpoint` one node's frames, `upload` uploaded missions. This file has
-//! the check sequence and the range of node numbers. `FORMAT.md` in this folder has the byte tables, `CONTRIBUTING.md` the steps to add
-//! a message.
+//! [`deframe`] splits the byte stream and decodes COBS, [`frame`] has addresses and the CRC, [`message`] the messages.
+//! [`digest`] has the digest of a mission, [`auth`] the authentication, `endpoint` one node's frames, `upload` uploaded
+//! missions. This file has the check sequence and the range of node numbers. `FORMAT.md` in this folder has the byte
+//! tables, `CONTRIBUTING.md` the steps to add a message.
 
 pub mod auth;
 mod blake2s;

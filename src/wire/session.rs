@@ -17,9 +17,9 @@
 //! | this relay's own nonce | proof that the node is present |
 //! | a request, and none of the above | reply only |
 //!
-//! Exactly one handshake answers a request that starts a session, that has not this relay's nonce, or that comes from a node
-//! with proved presence; nothing else is answered. So replayed frames cause at most one handshake each, which is replaced by
-//! another pending message, if there is one.
+//! Exactly one handshake answers a request that starts a session, that has not this relay's nonce, or that comes from a
+//! node with proved presence; nothing else is answered. So replayed frames cause at most one handshake each, which is
+//! replaced by another pending message, if there is one.
 //!
 //! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It does
 //! not contain this relay's new nonce, so it is no proof that its sender is present: it causes only a handshake in

@@ -1,8 +1,8 @@
 //! Uploaded mission, which replaces the mission loaded before flight. Also the format in which a relay stores it.
 //!
-//! An upload has a *version*, which identifies the newest one, and the digest of its *base*, the mission loaded before flight;
-//! relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it has one
-//! interferer, because a field does not fit into a frame.
+//! An upload has a *version*, which identifies the newest one, and the digest of its *base*, the mission loaded before
+//! flight; relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it
+//! has one interferer, because a field does not fit into a frame.
 
 use super::digest::MissionId;
 use super::digest::{between, digest, of};

@@ -1,6 +1,7 @@
 //! Fitted slots, each as long as its hop needs: positions of a chain for the largest data rate.
 //!
-//! With the spectral efficiency b = log2(1 + SINR / gap) of a hop, forward F and backward B, one bit to Rx and r bits back take
+//! With the spectral efficiency b = log2(1 + SINR / gap) of a hop, forward F and backward B, one bit to Rx and r bits
+//! back take
 //!
 //! ```text
 //! time = sum over hops of  1 / b(F) + r / b(B)
@@ -9,14 +10,15 @@
 //! in units of 1 / bandwidth; the rate is its inverse. A hop's time rises steeply with its length from 0, and is
 //! concave there. So the best chain mostly has a few long hops, and the other relays gather at their minimum
 //! separation. The sum has many local optima, and derivatives do not lead from one to another. But each term depends on
-//! two neighbours only. So if every relay may stay or move by one or two widths along one coordinate, one pass over the
+//! two neighbours only. Let every relay stay, or move by one or two widths along one coordinate. Then one pass over the
 //! relays finds the best of all 5^N combinations (dynamic programming; Viterbi 1967). The method repeats such passes
 //! over x, y and altitude, and halves the width when a round gains little. With the first width, relays jump from one
 //! group to another. No step raises the time. The method needs no derivatives, and the minimum separation is simply a
 //! condition of each hop.
 //!
-//! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
-//! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.
+//! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx.
+//! Lengths are in units of D, in which the widths are powers of two: the relays of a group keep their distances
+//! exactly.
 
 use super::chain::{Chain, Gains, SeatOf};
 use super::hop::{Triple, minus};
@@ -171,7 +173,7 @@ enum Work {
     Sum(u16),
 }
 
-/// Solver of the largest data rate with fitted slots.
+/// Solver of the largest data rate: time slots as hops need.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
     /// Gains of 1 W relays, divided by the SNR gap.

@@ -1,43 +1,44 @@
 //! Reach of a hop with its first and second derivatives.
 //!
-//! A hop leads from p to p', with c = gamma / A, the ratio of target and sender's gain, and the interferer at m. At its maximum
-//! length
+//! A hop leads from p to p', with c = gamma / A, the ratio of target and sender's gain, and the interferer at m. At its
+//! maximum length
 //!
 //! ```text
 //! 2 F = q(|p' - m|^2) - c |p' - p|^2 = 0,    q(s) = s / (1 + nu s)
 //! ```
 //!
-//! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2,
-//! w_3). With v = p' - m, w = 1 + nu s, q' = 1 / w^2 and q'' = -2 nu / w^3, the derivatives of F by p' are F_i = q' v_i - c (p' -
-//! p)_i and F_ij = (q' - c) [i = j] + 2 q'' v_i v_j; those by p are c (p' - p)_i and -c [i = j], and the mixed ones c [i = j].
-//! Without noise q' is 1 and q'' is 0, so F is quadratic. Those of R follow by differentiating F(R(z), z) = 0 once and twice,
-//! with a = -dF/dp'_1 = -q' v_1 + c (p' - p)_1:
+//! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2,
+//! p_3, w_2, w_3). With v = p' - m, w = 1 + nu s, q' = 1 / w^2 and q'' = -2 nu / w^3, the derivatives of F by p' are
+//! F_i = q' v_i - c (p' - p)_i and F_ij = (q' - c) [i = j] + 2 q'' v_i v_j; those by p are c (p' - p)_i and -c [i = j],
+//! and the mixed ones c [i = j]. Without noise q' is 1 and q'' is 0, so F is quadratic. Those of R follow by
+//! differentiating F(R(z), z) = 0 once and twice, with a = -dF/dp'_1 = -q' v_1 + c (p' - p)_1:
 //!
 //! ```text
 //! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + F_11 R_z R_z') / a
 //! ```
 //!
-//! The derivative by ln gamma is -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` compares them with an independent
-//! optimiser.
+//! The derivative by ln gamma is -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` compares them with an
+//! independent optimiser.
 //!
 //! # Coordinates
 //!
-//! The possible ends of a hop form a surface; beyond it the signal is too weak. Along most of a chain x is a smooth function of y
-//! and h on it; where the chain climbs vertically, or goes sideways, h or y is the dependent coordinate.
+//! The possible ends of a hop form a surface; beyond it the signal is too weak. Along most of a chain x is a smooth
+//! function of y and h on it; where the chain climbs vertically, or goes sideways, h or y is the dependent coordinate.
 //!
 //! # Noise
 //!
 //! With noise a hop is replaced by a noise-free hop that equals it near one distance from the interferer.
 //!
-//! q(s) = s / (1 + nu s) is concave, so with w = 1 + nu t its tangent at s = t is above it: q(s) <= (s + nu t^2) / w^2. Hence
+//! q(s) = s / (1 + nu s) is concave, so with w = 1 + nu t its tangent at s = t is above it: q(s) <= (s + nu t^2) / w^2.
+//! Hence
 //!
 //! ```text
 //! q(s) >= c l   =>   s + nu t^2 >= c w^2 l
 //! ```
 //!
-//! and the right side is a noise-free hop for the target c' = c w^2 with the margin nu t^2. For c' > 1 its reach is a ball, and
-//! one coordinate of the end follows from the other two by a square root. The ball contains all valid ends, and touches their
-//! surface where s = t; iterating t is Newton's method in s.
+//! and the right side is a noise-free hop for the target c' = c w^2 with the margin nu t^2. For c' > 1 its reach is a
+//! ball, and one coordinate of the end follows from the other two by a square root. The ball contains all valid ends,
+//! and touches their surface where s = t; iterating t is Newton's method in s.
 
 use crate::place::Placement;
 use crate::sir::square;

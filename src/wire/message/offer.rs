@@ -61,7 +61,7 @@ struct OfferBody {
     noise_w: f32,
     /// Ratio r, and transmit power of Rx, W.
     back: [f32; 2],
-    /// SNR gap of fitted time slots; 0 for equal slots.
+    /// SNR gap; 0 for equal time slots.
     fitted_gap: f32,
     /// Positions of Tx and Rx; all 0 if none.
     sites: SitesBody,

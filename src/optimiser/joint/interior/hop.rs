@@ -1,14 +1,14 @@
 //! Logarithms of both SIRs of a hop, with their derivatives.
 //!
-//! Lengths are in units of D. With v = p' - p the hop, l = |v|^2, and w the position of a receiver relative to the interferer,
-//! s = |w|^2 and nu the noise as in [`spacing`](crate::optimiser::spacing)
+//! Lengths are in units of D. With v = p' - p the hop, l = |v|^2, and w the position of a receiver relative to the
+//! interferer, s = |w|^2 and nu the noise as in [`spacing`](crate::optimiser::spacing)
 //!
 //! ```text
 //! ln F = a - ln l + ln q(p'),    ln (B / r) = a' - ln l + ln q(p),    ln q = ln s - ln(1 + nu s)
 //! ```
 //!
-//! where ln q is 0 at Rx and at Tx. With q1 = 1 / (s (1 + nu s)) and q2 = (nu / (1 + nu s))^2 - 1 / s^2, the derivatives of ln q
-//! by s, the gradients and second derivatives are
+//! where ln q is 0 at Rx and at Tx. With q1 = 1 / (s (1 + nu s)) and q2 = (nu / (1 + nu s))^2 - 1 / s^2, the
+//! derivatives of ln q by s, the gradients and second derivatives are
 //!
 //! ```text
 //! -ln l:  -2 v / l,    -(2 / l) I + (4 / l^2) v v'        ln q:  2 q1 w,    2 q1 I + 4 q2 w w'

@@ -1,26 +1,28 @@
 //! Interior-point method for the positions that maximise the worst SIR of both directions.
 //!
-//! With data in both directions a hop has two reaches, and in a sixth of the chains some hop is limited by both at
-//! once, where neither has a derivative. So differential dynamic programming, which follows one reach per hop, is not
-//! used: all positions move together. With the levels c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the
-//! method maximises
+//! With data in both directions a hop has two reaches. In a sixth of the chains some hop is limited by both at once,
+//! where neither has a derivative. So differential dynamic programming, which follows one reach per hop, is not used:
+//! all positions move together. With the levels c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the method
+//! maximises
 //!
 //! ```text
 //! merit = T + mu (sum of ln(c_i - T) + sum of ln(distances to the box)),    sum of mu / (c_i - T) = 1
 //! ```
 //!
-//! over the positions, for a falling mu; the second equation is the maximum over T, which is below every level by at least mu. At
-//! the maximum for one mu, a concave problem of m levels has its optimum within m mu. Each iteration is a primal-dual Newton step
-//! (see `newton`): the multipliers lambda_i follow their own linear equation instead of mu / (c_i - T), and remain within a factor
-//! of that. A step ends before the box and is shortened until the merit does not fall.
+//! over the positions, for a falling mu; the second equation is the maximum over T, which is below every level by at
+//! least mu. At the maximum for one mu, a concave problem of m levels has its optimum within m mu. Each iteration is a
+//! primal-dual Newton step (see `newton`): the multipliers lambda_i follow their own linear equation instead of mu /
+//! (c_i - T), and remain within a factor of that. A step ends before the box and is shortened until the merit does not
+//! fall.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | `hop` | levels of a hop and their derivatives |
 //! | `newton` | block tridiagonal system of a step |
 //!
-//! T is the *target* and mu the *barrier weight*, which the constants give for all levels together. The lambda_i are the Lagrange
-//! multipliers; mu / (c_i - T) are their values at the optimum. The positions have *settled* once the merit gains little.
+//! T is the *target* and mu the *barrier weight*, which the constants give for all levels together. The lambda_i are
+//! the Lagrange multipliers; mu / (c_i - T) are their values at the optimum. The positions have *settled* once the
+//! merit gains little.
 //!
 //! This file has the state and one portion of the work. Lengths are in units of D. A lateral offset and altitude are
 //! stored in six bytes, as in the other solver. The memory of a segment of ten relays has its front during the

@@ -1,7 +1,7 @@
 //! Newton step of all relays: elimination along the chain, and substitution back.
 //!
-//! With the levels c_i, the slacks s_i = c_i - T and the multipliers lambda_i (see [`super`]), the step dz of all positions and dT
-//! of the target solve
+//! With the levels c_i, the slacks s_i = c_i - T and the multipliers lambda_i (see [`super`]), the step dz of all
+//! positions and dT of the target solve
 //!
 //! ```text
 //! W dz = g + q dT,    q' dz = sigma dT
@@ -9,15 +9,16 @@
 //! q = sum of (lambda_i / s_i) grad c_i,    sigma = sum of lambda_i / s_i
 //! ```
 //!
-//! so dz = W^-1 g + dT W^-1 q and dT = q' W^-1 g / (sigma - q' W^-1 q). A hop has two ends, so W is block tridiagonal with blocks
-//! of 3 x 3: Cholesky's factors L_k of the diagonal and B_k beside it follow from one relay to the next,
+//! so dz = W^-1 g + dT W^-1 q and dT = q' W^-1 g / (sigma - q' W^-1 q). A hop has two ends, so W is block tridiagonal
+//! with blocks of 3 x 3: Cholesky's factors L_k of the diagonal and B_k beside it follow from one relay to the next,
 //!
 //! ```text
 //! L_k L_k' = W_kk - B_k B_k',    B_(k+1) = W_(k+1,k) L_k'^-1,    u_k = L_k^-1 (g_k - B_k u_(k-1))
 //! ```
 //!
-//! and the step from the last to the first: L_k' dz_k = u_k - B_(k+1)' dz_(k+1). A [`Front`] is all that the relays after k need
-//! to know of those before. It is stored for one relay in ten; the factors are computed again on the way back.
+//! and the step from the last to the first: L_k' dz_k = u_k - B_(k+1)' dz_(k+1). A [`Front`] is all that the relays
+//! after k need to know of those before. It is stored for one relay in ten; the factors are computed again on the way
+//! back.
 //!
 //! A pivot that is not positive means that W is not positive definite. The caller then leaves out its negative parts.
 

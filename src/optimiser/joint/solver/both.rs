@@ -6,11 +6,12 @@
 //! target that the relays will agree on, with their separation. The best chain is the result.
 //!
 //! The first chain, at the common altitude, is only compared: so the result is not below that of Algorithm 1. The next
-//! five were chosen from 216, one after another, by the number of 3 840 random scenes in which the best result so far
-//! misses the optimum. They are described from the end with more power, whose signal may pass the interferer in one
-//! hop. Relays away from the interferer or high are mostly better than relays close to it, since the method finds its
-//! way down but not around. The last chain keeps relay 1 from the x beyond the interferer. These x are another local
-//! optimum for it. From the other chains the method mostly finds that one, as the x of Algorithm 1 are the farthest.
+//! five were chosen from 216, one after another. The criterion was the number of 3 840 random scenes in which the best
+//! result so far misses the optimum. They are described from the end with more power, whose signal may pass the
+//! interferer in one hop. Relays away from the interferer or high are mostly better than relays close to it, since the
+//! method finds its way down but not around. The last chain keeps relay 1 from the x beyond the interferer. These x are
+//! another local optimum for it. From the other chains the method mostly finds that one, as the x of Algorithm 1 are
+//! the farthest.
 
 use super::judge::JUDGED;
 use crate::optimiser::joint::chain::{Chain, SeatOf};

@@ -14,7 +14,8 @@
 //! | `judge` | the steps after a target is found: the next initial chain, or the polish |
 //! | `both` | the solver for both directions |
 //!
-//! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the work.
+//! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the
+//! work.
 
 mod both;
 mod judge;
@@ -215,7 +216,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 /// Solvers both ways: 1 with `altitude` and `reverse`, else 0.
 const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
-/// Solvers for fitted slots: 1 with `altitude`, else 0.
+/// Solvers for unequal time slots: 1 with `altitude`, else 0.
 const FITTED: usize = ALTITUDE as usize;
 
 /// Joint solver: one of three kinds, which share memory.
@@ -311,7 +312,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solved.unwrap_or(Poll::Ready(Err(Infeasible)))
     }
 
-    /// Returns the solved position and time slots, if slots are fitted.
+    /// Returns the solved position and time slots; `None` for equal slots.
     pub fn fitted(
         &self,
         mission: &Mission,
