@@ -144,7 +144,7 @@ impl Channel {
         })
     }
 
-    /// Returns the channel with eta between the other factors. Rounding can put it outside.
+    /// Returns the channel with eta clamped between the other factors.
     pub(crate) fn ordered(self) -> Self {
         Self {
             eta: self.eta.max(self.mu_los).min(self.mu_nlos),

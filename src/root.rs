@@ -43,7 +43,7 @@ pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bo
     (low, high)
 }
 
-/// Power ratio as a sum of two f32, exact near a target. One f32 would lose up to 6e-8 A in gamma - A.
+/// Power ratio as a sum of two f32, exact near a target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PowerRatio {

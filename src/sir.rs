@@ -90,15 +90,14 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at Rx for a relay of `power_w` watts. `SIR_{N+1}` of the paper: [`Mission::receiver_gain`] / squared
-/// distance.
+/// Returns the SIR at Rx, the paper's `SIR_{N+1}`. It is [`Mission::receiver_gain`] / squared distance.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
     mission.receiver_gain(power_w) / (square(distance) + across)
 }
 
-/// Returns the SIR at Tx for a relay of `power_w` watts. 0 while the interferer is unknown.
+/// Returns the SIR at Tx; 0 while the interferer is unknown.
 pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let across = square(from.y_m) + square(from.altitude_m);
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)

@@ -187,7 +187,7 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` plus up to an eighth, at random. Relays then do not transmit at once again and again.
+    /// Returns `span` plus up to an eighth, at random.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.

@@ -61,7 +61,7 @@ impl ViewId {
         }
     }
 
-    /// Returns a 16-bit value, added to the mission's digest. It differs by proposer, and over thousands of views.
+    /// Returns a 16-bit value, added to the mission's digest. It differs by proposer.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

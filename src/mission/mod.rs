@@ -714,7 +714,7 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x between neighbours, m. `across_squared` is perpendicular to x, m^2.
+    /// Returns the minimum step in x between neighbours, m.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -723,7 +723,7 @@ impl Mission {
         sqrt(apart * apart - across_squared)
     }
 
-    /// Returns the minimum step in x plus a rounding margin, m. `across_squared` is perpendicular to x, m^2.
+    /// Returns the minimum step in x plus a rounding margin, m.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
@@ -780,7 +780,7 @@ impl Mission {
     }
 }
 
-/// Factor on a gain that halves the length of a hop. It holds because all hops of the best chain have equal SIR.
+/// Factor on a gain that halves the length of a hop.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {

@@ -72,7 +72,7 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin `(SIR / required SIR - 1) D`, m. Below 0 if `target` is missed; continuous in `target`.
+    /// Returns the margin `(SIR / required SIR - 1) D`, m. Below 0 if `target` is missed.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -81,8 +81,7 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x that receives Rx well enough, m. It is in [`least_m`, `x_m`]; `x_m` itself must miss
-    /// `target`.
+    /// Returns the largest x that receives Rx well enough, m. `x_m` itself must miss `target`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;

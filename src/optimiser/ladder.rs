@@ -29,7 +29,7 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// Returns a ladder with one target, above 0. The chain commits to it if met.
+    /// Returns a ladder with one target, above 0.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -67,8 +67,7 @@ impl Ladder {
         )
     }
 
-    /// Returns 16 targets dense around `centre`, which span [`low`, `high`]. `gap` is the relative gap there; gaps grow
-    /// outward.
+    /// Returns 16 targets dense around `centre`, which span [`low`, `high`].
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);

@@ -123,7 +123,7 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the two hops of a relay of `power_w` watts. `before` is `None` for Tx, `after` for Rx.
+    /// Returns the two hops; `before` is `None` for Tx, `after` for Rx.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -251,8 +251,7 @@ impl LocalSearch {
         }
     }
 
-    /// Continues by `budget` evaluations, at most one altitude more. One altitude: 24, in both directions 194. `Ready`
-    /// with a strictly better position.
+    /// Continues by `budget` evaluations, at most one altitude more. `Ready` with a strictly better position.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let mut left = budget;
         while left > 0 {
@@ -285,7 +284,7 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude, m: `part` 0 lowest, 1 highest. Never above the highest, in spite of rounding.
+    /// Returns an altitude, m: `part` 0 lowest, 1 highest.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -344,8 +343,7 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Returns the best SIR of the worse hop, for x in `low` to `high`. Narrow maxima have equal SIRs: bisection finds
-    /// the first two.
+    /// Returns the best SIR of the worse hop, for x in `low` to `high`.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
@@ -421,7 +419,7 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns the search between two neighbours 100 m from each other. `beside_m` is their altitude.
+    /// Returns the search between two neighbours 100 m from each other.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

@@ -90,8 +90,7 @@ pub fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends this relay's reach for each target not in `reaches` yet. Targets ascend. The list ends before the first
-    /// missed target.
+    /// Appends this relay's reach for each target not in `reaches` yet. The list ends before the first missed target.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -238,7 +237,7 @@ impl<'a> Link<'a> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the slack for `target`, and this last relay's x, m. `None` if Rx is out of reach from everywhere.
+    /// Returns the slack for `target`, and this last relay's x, m.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -287,7 +286,7 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x that receives the previous relay, m. That relay is anywhere up to `from_m`.
+    /// Returns the largest x that receives the previous relay, m.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -295,7 +294,7 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the slack and this last relay's x, m, both directions. It stops before `reach` if Rx would be too weak.
+    /// Returns the slack and this last relay's x, m, both directions.
     fn held(
         &self,
         hop: &FromRx,
@@ -326,7 +325,7 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the previous relay must take, if any. Possible x are assumed to be one interval.
+    /// Returns the x that the previous relay must take, if any.
     pub fn required_position(
         &self,
         target: f32,
@@ -411,8 +410,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result for `ladder`; `slacks` in m. The highest met target is committed if the next is close, or it
-    /// is single.
+    /// Returns the result for `ladder`; `slacks` are in m.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -546,8 +544,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes all positions from the last relay, at `place`, to the first. `visit` returns the reach of the previous
-    /// relay, m.
+    /// Computes all positions from the last relay, at `place`, to the first.
     pub fn settle(
         &self,
         place: f32,

@@ -26,7 +26,7 @@ pub struct Agreed {
     pub sweeps: u32,
 }
 
-/// Solver of a whole chain without messages. Its size does not depend on the number of relays.
+/// Solver of a whole chain without messages.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
@@ -154,8 +154,7 @@ pub fn solve(
 }
 
 impl Mission {
-    /// Returns relay `index`'s position without messages, if any. It equals the agreed one to the bit. All relays must
-    /// have the mission's profile.
+    /// Returns relay `index`'s position without messages, if any. All relays must have the mission's profile.
     pub fn silent_place(&self, index: u16) -> Option<Placement> {
         let common = |_| self.config().common;
         let agreed = solve(self, Schedule::Bracketed, common).ok()?;

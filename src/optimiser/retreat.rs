@@ -70,7 +70,7 @@ const ULPS: u8 = 8;
 /// Hop toward Rx in a field, from a searched sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A, m^2: SIR = `A quiet / squared length`. `quiet` is Upsilon divided by the largest; to Rx it is in A.
+    /// Gain A, m^2: SIR = `A quiet / squared length`. `quiet` is Upsilon divided by the largest.
     gain: f32,
     /// Squared altitude difference of the hop, m^2.
     climb_squared: f32,
@@ -104,8 +104,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Adds the backward hop, if the mission has one. Its sender has `power_w` watts, or is Rx. `measured_per_w` is
-    /// Upsilon at its receiver, 1/W.
+    /// Adds the backward hop, if the mission has one. `measured_per_w` is Upsilon at its receiver, 1/W.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,
@@ -158,7 +157,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x in [`place`, `most_m`) that receives the backward hop, m. Work: one root per field point.
+    /// Returns the smallest x in [`place`, `most_m`) that receives the backward hop, m.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(
         &self,
@@ -253,7 +252,7 @@ impl<'a> Retreat<'a> {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop with the smallest x of its sender. The receiver is in [`low`, `high`], m.
+    /// Returns the hop with the smallest x of its sender.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -314,8 +313,7 @@ impl<'a> Retreat<'a> {
         best
     }
 
-    /// Returns the smallest sender x for a receiver at `y_m`, m. `best_m` adds the backward hop; a lower result
-    /// replaces it.
+    /// Returns the smallest sender x for a receiver at `y_m`, m.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -344,8 +342,7 @@ impl<'a> Retreat<'a> {
         least(interference, self.gain / target, squares, low, high, value)
     }
 
-    /// Returns the receiver x that just meet both directions, m. Sender in `from`, receiver in `to`. `gains` are
-    /// divided by the target.
+    /// Returns the receiver x that just meet both directions, m. `gains` are divided by the target.
     fn equal_limits(&self, gains: [f32; 2], from: Piece, to: Piece) -> [Option<f32>; 2] {
         let [c, back] = gains;
         let (rise, back_rise) = (c * to.slope, back * from.slope);
@@ -398,7 +395,7 @@ pub enum HopInterference<'a> {
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the measurement, or else the field. `measured_per_w` is Upsilon, 1/W, with noise.
+    /// Returns the measurement, or else the field.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),

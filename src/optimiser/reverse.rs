@@ -107,13 +107,13 @@ impl Back {
         self.gain * in_noise(squared, self.noise)
     }
 
-    /// Returns the maximum length along x, m, if any. `across_squared` is perpendicular to x, m^2.
+    /// Returns the maximum length along x, m, if any.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns the backward hop as a function of its length. `across_squared` is perpendicular to x, m^2.
+    /// Returns the backward hop as a function of its length.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -127,8 +127,7 @@ impl Back {
         }
     }
 
-    /// Returns the distance from the interferer below which `target` is missed, m. `squared` is the hop's, m^2. `None`
-    /// if missed everywhere.
+    /// Returns the distance from the interferer below which `target` is missed, m. `None` if missed everywhere.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }

@@ -38,7 +38,7 @@ pub enum Schedule {
     ///
     /// The first target is the upper bound.
     FixedStep {
-        /// Step epsilon between two targets, linear SIR, above 0.
+        /// Step between two targets, linear SIR, above 0.
         ///
         /// It is an f64, because it is subtracted up to ten thousand times.
         step: f64,
@@ -97,7 +97,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Creates the search; the leader of `mission` has the profile `leader`.
+    /// Creates the search of a leader with the profile `leader`.
     ///
     /// # Errors
     /// [`Infeasible`] if the interferer is at Rx.
@@ -179,8 +179,6 @@ impl Search {
     }
 
     /// Continues with the slacks, m, of [`Search::ladder`]'s first targets.
-    ///
-    /// Some 200 floating-point operations and three logarithms.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.
@@ -275,7 +273,7 @@ impl Search {
     }
 }
 
-/// Lowers `start` and `met` for data from Rx to Tx. `start` respects the hop to Tx, `met` also that from Rx.
+/// Lowers `start` and `met` for data from Rx to Tx.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -296,8 +294,7 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target with slack 0, by cubic interpolation of ln(target). `None` if a straight line differs much: the
-/// slack jumps.
+/// Returns the target with slack 0, by cubic interpolation. `None` if a straight line differs much: the slack jumps.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -343,7 +340,7 @@ struct StandTrials {
 }
 
 impl Search {
-    /// Returns the refused target, if any. A relay refuses by deleting the commit from `verdict`.
+    /// Returns the refused target, if any.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
@@ -366,7 +363,7 @@ impl Search {
         last || self.try_next().is_err() || self.trials.is_some_and(|trials| trials.over)
     }
 
-    /// Continues after a relay refused `target`. All relays take their farthest x first: none can refuse.
+    /// Continues after a relay refused `target`.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.

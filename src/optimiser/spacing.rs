@@ -97,8 +97,7 @@ pub struct Hop {
 }
 
 impl Hop {
-    /// Creates the hop to relay `index` at `at`. `spread_squared` is later neighbours' largest squared distance
-    /// perpendicular to x, m^2.
+    /// Creates the hop to relay `index` at `at`.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -124,8 +123,7 @@ impl Hop {
         }
     }
 
-    /// Creates the hop to `at` with x up to `end_m`. It has no minimum length. `noise`: divided by the interferer's
-    /// power at 1 m, 1/m^2.
+    /// Creates the hop to `at` with x up to `end_m`, without minimum length.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -259,8 +257,7 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x that meets `target` both ways, m. `place` is that from `from_m`; a smaller sender x can be
-    /// better.
+    /// Returns the largest x that meets `target` both ways, m.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -340,7 +337,7 @@ impl Hop {
         }
     }
 
-    /// Returns the required sender position, if permitted. The closest one has the best SIR.
+    /// Returns the required sender position, if permitted.
     pub fn required_position(
         &self,
         target: f32,
@@ -385,7 +382,7 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x that meets `target`, m, without a minimum step. It is smooth, and can be below `from_m`.
+    /// Returns the largest x that meets `target`, m, without a minimum step. It must be smooth in `target`.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {

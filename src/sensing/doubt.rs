@@ -52,7 +52,7 @@ const OUT_OF_LINE: f64 = 4.0;
 /// Minimum drop of the residual without the faulty relay, in variances.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual and drop that show a faulty relay. One measurement that is wrong by 15 % has it.
+/// Minimum residual and drop that show a faulty relay.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of second smallest to smallest variance.
@@ -226,7 +226,7 @@ fn narrow(number: f64) -> f32 {
 /// Factor between measurement and estimate that a relay doubts.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if a measurement is absurd. It is far from `expected`, and inconsistent with `others`.
+/// Returns true if a measurement is absurd, far from `expected`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -269,7 +269,7 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing is faulty. By `others` it should measure several times `noise_w`, W.
+/// Returns true if a relay that measures nothing is faulty. It should measure several times `noise_w`, W.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -294,7 +294,7 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level at Tx or Rx does not fit; the larger counts. A multiple of the variance, and a squared
+/// Limits above which a level at Tx or Rx does not fit; the larger counts. A multiple of the variance, a squared
 /// relative difference.
 const APART: (f64, f64) = (49.0, 0.174);
 
@@ -314,7 +314,7 @@ impl EndLevel {
     }
 }
 
-/// Converts a `level` at Tx or Rx to v = 1e-12 W / I. By the mission's path loss over the ground.
+/// Converts a `level` at Tx or Rx to v = 1e-12 W / I.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)

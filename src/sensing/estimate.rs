@@ -128,7 +128,7 @@ const LEARNED: f64 = 1.1;
 /// Number of refinements before a stationary estimate stays.
 const REFINED: u8 = 4;
 
-/// Assumed flight time for a few metres. A moving interferer is predicted this far.
+/// Assumed flight time for a few metres.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
 /// Mean square relative error that contradicts the source.
@@ -167,8 +167,7 @@ pub(crate) struct Review {
     pub(crate) ends: EndsOff,
 }
 
-/// Compares the measurements with `estimate`; returns a new one, if any. `before` is the quality of `estimate` at its
-/// adoption.
+/// Compares the measurements with `estimate`; returns a new one, if any.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -347,8 +346,7 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at Rx, W; 0 if not measured. It is a weighted mean with the computed power, unless
-/// they differ too much.
+/// Returns the interference power at Rx, W; 0 if not measured.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,

@@ -118,7 +118,7 @@ impl Factor {
         last
     }
 
-    /// Returns the variance of the fitted value, `r^T G^-1 r`. r are the `terms`.
+    /// Returns the variance of the fitted value, `r^T G^-1 r`.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -232,14 +232,14 @@ impl Fit {
         self.count / self.variance
     }
 
-    /// Returns the mean square relative difference of two sources. Sources are [`coefficients`].
+    /// Returns the mean square relative difference of two sources.
     pub(crate) fn mean_square_difference(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference to another source. It is given by its [`coefficients`].
+    /// Returns the mean square relative difference to another source.
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)
     }
@@ -331,7 +331,7 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function from terms to v = 1e-12 W / I. `None` without a known source, or out of range.
+/// Returns a function from terms to v = 1e-12 W / I.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()

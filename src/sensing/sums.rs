@@ -283,7 +283,7 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measurement; `heard` is above 0, in [`UNIT_W`]. `expected` returns v by the current estimate.
+    /// Adds a measurement; `heard` is above 0, in [`UNIT_W`].
     pub(crate) fn add(
         &mut self,
         now: Instant,

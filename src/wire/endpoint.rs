@@ -91,7 +91,7 @@ impl Endpoint {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Encodes `message`, or a handshake that must come first. The caller then sends the message later.
+    /// Encodes `message`, or a handshake that must come first.
     pub(crate) fn transmit(
         &mut self,
         to: u16,

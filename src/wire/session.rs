@@ -169,7 +169,7 @@ pub(crate) enum Checked {
 }
 
 impl Session {
-    /// Creates an empty table; nonces count up from `claim`. After `gone_after` another node can replace a silent one.
+    /// Creates an empty table; nonces count up from `claim`.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -214,7 +214,7 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to `to`, once per renewal `number`. A duplicate node then learns of this relay.
+    /// Schedules a handshake to `to`, once per renewal `number`.
     pub(crate) fn show(&mut self, to: u16, number: u16) {
         if self.shown == Some(number) {
             return;

@@ -33,7 +33,7 @@ const LEAST_SPARE: f32 = 4e-5;
 /// Weight of negative slack relative to positive slack.
 const SHORT: f32 = 2.0;
 
-/// Increase of ln(target SIR) that counts as idle. Two idle iterations end the improvement.
+/// Increase of ln(target SIR) that counts as idle.
 const CLOSE: f32 = 3e-6;
 
 /// Expected increase of ln(target SIR) that ends the improvement.
@@ -74,7 +74,7 @@ pub(crate) struct Ascent {
     pub(crate) limit: f32,
     /// Next increase of `limit`, in ln(SIR).
     excess: f32,
-    /// Upper limit on the slack, in Tx-Rx distances. It falls if relays are too near the interferer.
+    /// Upper limit on the slack, in Tx-Rx distances.
     spare: f32,
     /// Penalty for relays too near the interferer, m.
     pub(crate) penalty: f32,
@@ -217,7 +217,7 @@ impl Ascent {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the improvement should end at most at `sigma`. False without a prediction.
+    /// Returns true if the improvement should end at most at `sigma`.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;

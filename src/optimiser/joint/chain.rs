@@ -76,7 +76,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         }
     }
 
-    /// Returns c, the target divided by the gain. With noise it includes `1 + noise / interference` at the sender.
+    /// Returns c, the target divided by the gain. With noise: times `1 + noise / interference` at the sender.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -95,8 +95,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude interpolated between fixed ones, m. Outside them it is constant if `level`, else falls to
-    /// the lowest.
+    /// Returns the altitude interpolated between fixed ones, m. Outside them it is constant if `level`, else falls.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -118,8 +117,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack and its derivatives by the last relay. Slack: maximum length of the last hop minus its length,
-    /// m.
+    /// Returns the slack of the chain, m, and its derivatives by the last relay.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = self.seat(self.relays());
         let most = site::last_most(self.mission, power_w, room);
@@ -149,8 +147,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 }
 
-/// Gains of all hops both ways, in Tx-Rx distances. `SIR = gain / (interference l^2)`; at Rx and Tx the gain has the
-/// interference.
+/// Gains of all hops both ways, in Tx-Rx distances. `SIR = gain / (interference l^2)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
     /// Position of the interferer, in units of the Tx-Rx distance.

@@ -62,12 +62,11 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Initial chain that begins with the best one so far. Used only if an offset or altitude is free.
+/// Initial chain that begins with the best one so far.
 const BEST: u8 = 8;
 /// First step width of [`BEST`], in Tx-Rx distances.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Offset and altitude of further initial chains, as fractions. Offsets are away from the interferer, altitudes from
-/// the common one up.
+/// Offset and altitude of further initial chains, as fractions.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Time slots of a relay's hops: begin and end as fractions of the frame.
@@ -121,7 +120,7 @@ impl State {
     };
 }
 
-/// Hop: its gains divided by the SNR gap, r, and the minimum separation. r is the data rate back divided by that to Rx.
+/// Hop: its gains divided by the SNR gap, r, and the minimum separation.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
@@ -456,8 +455,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of hop `hop`'s slot to Rx, and begin of its slot back. Fractions of the frame; hop 0 gives 0 and
-    /// 1.
+    /// Returns the end of hop `hop`'s slot to Rx, and begin of its slot back. Hop 0 gives 0 and 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {

@@ -43,8 +43,7 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end of a hop that just meets its target. One coordinate follows from two free ones w and the
-/// start p.
+/// Derivatives of the end of a hop that just meets its target. w are its free coordinates, p is the start.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -73,8 +72,7 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Returns the derivatives of the hop near an interferer at `source`. All points have the dependent coordinate
-    /// first. [`Reach::FIXED`] at the rim.
+    /// Returns the derivatives; all points have the dependent coordinate first. [`Reach::FIXED`] at the rim.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);

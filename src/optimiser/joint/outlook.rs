@@ -12,7 +12,7 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function: the slack as a quadratic in a position. Later relays react optimally.
+/// Value function: the slack as a quadratic in a position.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack by x, y, h, m/m.

@@ -21,14 +21,14 @@ pub(super) enum Start {
     Around { aside: f32, up: f32, far: f32 },
     /// Parabola without a separation. Hops are as in flight.
     Through { aside: f32, up: f32 },
-    /// Parabola, seen from above, through the fixed altitudes; `aside` as in `Arch`. Outside them altitudes stay if
-    /// `level`, else fall to the lowest.
+    /// Parabola, seen from above, through the fixed altitudes; `aside` as in `Arch`. Outside them they stay if `level`,
+    /// else fall.
     FixedAltitudes { aside: f32, level: bool },
-    /// Zigzag at the highest corner away from the interferer. For relays that do not fit one behind the other.
+    /// Zigzag, for relays that do not fit one behind the other.
     Turns,
     /// Chain at the lowest altitude, for a very high target.
     Near,
-    /// Relay 1 at Rx's x, high or far beside it. The others lead down to the line in equal steps.
+    /// Relay 1 at Rx's x, high or far beside it.
     Far,
 }
 
@@ -95,8 +95,7 @@ impl Way {
         }
     }
 
-    /// Returns the end of a hop along the spiral, relative to the interferer. Its length is `step` times its end's
-    /// radius.
+    /// Returns the end of a hop along the spiral. Its length is `step` times its end's radius.
     fn after(&self, here: Triple, step: f32) -> Triple {
         let bend = 0.5 * step * self.rise / self.length;
         let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
@@ -122,7 +121,7 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns a relay's lateral offset and altitude on a spiral. `c`, target / gain, gives the hop's length.
+    /// Returns a relay's lateral offset and altitude on a spiral.
     pub(super) fn around(
         self,
         distance_m: f32,

@@ -87,7 +87,7 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum of x values and slacks, m. A position (1e6 m) plus the last hop (1e9 m) fits.
+/// Maximum of x values and slacks, m.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]

@@ -405,7 +405,7 @@ fn is_sir(sir: f32) -> bool {
 /// Length of a sensing message's body, bytes.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Interference estimate, and sums of measurements. Sums of relays up to the sender; in replies from it on.
+/// Interference estimate, and sums of measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the message, rising and wrapping.

@@ -172,7 +172,7 @@ fn a_handshake_body_contains_the_known_nonces() {
     );
 }
 
-/// Checks that a full table keeps pinned and newest entries. Recordings of a forgotten node are rejected.
+/// Checks that a full table keeps pinned and newest entries.
 #[test]
 fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     let mut own = session();
@@ -330,7 +330,7 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks which frames reveal a node of the same number. Only those with the same key and no older epoch.
+/// Checks which frames reveal a node of the same number.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;

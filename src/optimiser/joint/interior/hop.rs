@@ -87,7 +87,7 @@ impl LogGains {
         }
     }
 
-    /// Returns hop `k`'s log gains, the backward one divided by r. `k` is 1 (from Tx) to N + 1 (to Rx).
+    /// Returns hop `k`'s log gains, the backward one divided by r.
     fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;
@@ -197,6 +197,6 @@ pub(super) struct Derivatives {
     pub(super) by_to: [Triple; 2],
     pub(super) bend_from: Symmetric,
     pub(super) bend_to: Symmetric,
-    /// Part of `bend_...` from the hop's length. The mixed derivatives are its negative.
+    /// Part of `bend_...` from the hop's length.
     pub(super) bend: Symmetric,
 }

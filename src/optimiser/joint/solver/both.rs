@@ -274,13 +274,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the initial chain; `None` after the last. Chain 0 uses only `along` of chain 1.
+    /// Returns the initial chain; `None` after the last.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
     }
 
-    /// Stores the chain if its target `sigma` is best; returns the next work.
+    /// Stores the chain if `sigma` is best; returns the next work.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);

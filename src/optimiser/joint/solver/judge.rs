@@ -225,8 +225,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of one relay, from the target `sigma`. The derivatives do not show these improvements:
-    /// another constraint is active.
+    /// Tries the next move of one relay, from the target `sigma`.
     pub(super) fn polish(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -338,7 +337,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns relay `index`'s lateral offset and altitude. For [`Purpose::Start`] new ones, else stored ones.
+    /// Returns relay `index`'s lateral offset and altitude.
     pub(super) fn shaped(
         &self,
         chain: &Chain<'_, impl SeatOf>,

@@ -276,7 +276,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         cell.unwrap_or_default().place(seat.room)
     }
 
-    /// Returns the largest x with room for later relays, m. To the bit the solver's limit.
+    /// Returns the largest x with room for later relays, m.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let chain = Chain::new(mission, seat_of);
         let solved = chain.zip(self.cells());
