@@ -251,7 +251,7 @@ impl LocalSearch {
         }
     }
 
-    /// Continues by `budget` evaluations, at most one altitude more. `Ready` with a strictly better position.
+    /// Continues by at most `budget` evaluations plus one altitude. `Ready` with a strictly better position.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let mut left = budget;
         while left > 0 {
