@@ -2,7 +2,7 @@
 
 /// Position in the air.
 ///
-/// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
+/// x runs along the ground from Tx toward Rx, y to its right seen from above, h up.
 ///
 /// ```
 /// use uav_relay::Placement;
@@ -14,21 +14,21 @@
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Placement {
-    /// Distance from the transmitter along the ground, m: 0 to D, the distance from Tx to Rx.
+    /// Distance from Tx along the ground, m: 0 to D, that of Rx.
     pub x_m: f32,
-    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
+    /// Lateral offset, m: positive to the right, seen from Tx toward Rx.
     pub y_m: f32,
-    /// Height of the position above the ground, m.
+    /// Height above the ground, m.
     pub altitude_m: f32,
 }
 
 impl Placement {
-    /// Creates the position right above the line from transmitter to receiver: the lateral offset is 0.
+    /// Creates the position with the lateral offset 0.
     pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
         CrossSection::on_line(altitude_m).at(x_m)
     }
 
-    /// Returns the lateral offset and altitude of the position, without its x.
+    /// Returns the lateral offset and altitude.
     #[doc(hidden)]
     pub const fn cross_section(self) -> CrossSection {
         CrossSection {
@@ -38,18 +38,18 @@ impl Placement {
     }
 }
 
-/// Lateral offset and altitude of a relay: its position without x.
+/// Lateral offset and altitude: a position without x.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
-    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
+    /// Lateral offset, m: positive to the right, seen from Tx toward Rx.
     pub y_m: f32,
-    /// Height of the relay above the ground, m.
+    /// Height above the ground, m.
     pub altitude_m: f32,
 }
 
 impl CrossSection {
-    /// Creates the cross-section right above the line from Tx to Rx: the lateral offset is 0.
+    /// Creates the cross-section with the lateral offset 0.
     pub const fn on_line(altitude_m: f32) -> Self {
         Self {
             y_m: 0.0,
@@ -57,7 +57,7 @@ impl CrossSection {
         }
     }
 
-    /// Returns the position at `x_m` with this lateral offset and altitude.
+    /// Returns the position at `x_m`.
     pub const fn at(self, x_m: f32) -> Placement {
         Placement {
             x_m,
@@ -72,32 +72,34 @@ impl CrossSection {
     }
 }
 
-/// Lateral offset, altitude and transmit power of a relay. Its x is not given but computed.
+/// Lateral offset, altitude and power of a relay without its x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {
-    /// Lateral offset and altitude of the relay.
+    /// Lateral offset and altitude.
     pub cross_section: CrossSection,
-    /// Transmit power of the relay, W.
+    /// Transmit power, W.
     pub power_w: f32,
 }
 
-/// Behaviour of a relay while it can reach too few relays for a quorum of the chain.
+/// Behaviour of a relay that reaches too few others for a quorum.
 ///
-/// [`Leave`](Self::Leave) moves the drone out of the way of the relays that have a quorum. Set the same value on all
-/// relays. Relays that leave the line then keep their order and distances.
+/// [`Leave`](Self::Leave) moves the drone out of the way of the relays with a quorum. Set the same value on all relays:
+/// those that leave keep their order and distances.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
-    /// Hold the last position that the chain has agreed on.
+    /// Hold the last agreed position.
     #[default]
     Hold,
-    /// Leave the line from Tx to Rx: fly sideways (along y) and upward from the last agreed position. A guard keeps the
-    /// drone in its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
+    /// Fly sideways (along y) and upward from the last agreed position.
+    ///
+    /// A guard keeps the drone in its geofence
+    /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
-        /// Lateral offset that is added to the last position that the chain has agreed on, m: -1e4 to 1e4.
+        /// Change of the lateral offset, m: -1e4 to 1e4.
         y_m: f32,
-        /// Height that is added to the last position that the chain has agreed on, m: 0 to 1e4.
+        /// Change of the altitude, m: 0 to 1e4.
         up_m: f32,
     },
 }
@@ -110,8 +112,7 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the position at which a drone waits while its relay has no quorum. `place` is the last position that the
-    /// chain has agreed on.
+    /// Returns the waiting position; `place` is the last agreed one.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

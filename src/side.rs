@@ -1,30 +1,30 @@
 //! The two sides of a relay, and the order in which positions are computed along the chain.
 
-/// Order in which the positions of a chain are computed; it determines the leader.
+/// Order in which positions are computed; it determines the leader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position is computed
-    /// from the position of its neighbour toward Tx, which sends to this relay.
+    /// Relay 1 first: used with an interferer (Algorithm 1). A position follows from that of the sender toward Tx.
     TowardRx,
-    /// Order from Rx to Tx, relay N first: used with an interference field (Algorithm 4). Each relay's position is
-    /// computed from the position of its neighbour toward Rx, which receives from this relay.
+    /// Relay N first: used with an interference field (Algorithm 4). A position follows from that of the receiver
+    /// toward Rx.
     TowardTx,
 }
 
-/// Side of a relay along the chain, toward Tx or toward Rx. Also used for the neighbour on that side, and for the link
-/// to this neighbour.
+/// Direction from a relay: toward Tx or toward Rx.
+///
+/// Also the neighbour there, and the link to it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Side of a relay toward the transmitter Tx.
+    /// Direction toward Tx.
     Upstream,
-    /// Side of a relay toward the receiver Rx.
+    /// Direction toward Rx.
     Downstream,
 }
 
 impl Side {
-    /// Returns the side to which a relay forwards messages along the chain in the direction `heading`.
+    /// Returns where messages in the direction `heading` are forwarded to.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -32,8 +32,7 @@ impl Side {
         }
     }
 
-    /// Returns the side from which messages along the chain in the direction `heading` arrive. Replies are sent to this
-    /// side.
+    /// Returns where messages come from; replies go there.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

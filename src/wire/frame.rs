@@ -6,10 +6,10 @@ use super::message::{MAX_BODY, Message, MessageError};
 pub use super::{MAX_NODE, MAX_SWEEP};
 use crate::features::AUTH;
 
-/// Version of the frame format, in the top four bits of a frame's first 16-bit word.
+/// Version of the format, in a frame's top four bits.
 pub const VERSION: u8 = 1;
 
-/// Length of a frame's header, bytes.
+/// Length of a header, bytes.
 pub const HEADER: usize = 10;
 
 const CHECK: usize = 4;
@@ -17,30 +17,31 @@ const CHECK: usize = 4;
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
-/// Maximum length of a frame on the wire, bytes. COBS adds one byte below 254 bytes, and the delimiter is another
-/// byte.
+/// Maximum length of a frame on the wire, bytes.
+///
+/// COBS adds one byte below 254 bytes, the delimiter another.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
-/// Header flag: an authentication tag follows the body.
+/// Header flag: a tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Header flag: the body is an authentication handshake. It is valid with a tag only.
+/// Header flag: the body is a handshake, valid with a tag.
 const HANDSHAKE: u16 = 0x2000;
 
-/// Buffer for one encoded frame, of the maximum length.
+/// Buffer for one encoded frame.
 pub type FrameBuf = [u8; MAX_FRAME];
 
-/// Header of a frame: numbers of the network, the sender, the destination and the frame.
+/// Header of a frame: network, sender, destination, counter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Number of the network, which separates chains that receive each other.
+    /// Number of the network, which separates chains.
     pub network: u16,
-    /// Node number of the sender: 0 is Tx, 1 to N the relays, N + 1 Rx.
+    /// Node number of the sender: 0 Tx, 1 to N relays, N + 1 Rx.
     pub sender: u16,
-    /// Node number of the frame's destination.
+    /// Node number of the destination.
     pub destination: u16,
-    /// Number of frames that the sender sent before this frame, wrapping.
+    /// Number of earlier frames of the sender, wrapping.
     pub counter: u32,
 }
 
@@ -49,13 +50,13 @@ pub struct Header {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FrameError {
-    /// The frame is too short for a header and a CRC.
+    /// Frame too short for a header and a CRC.
     Short,
-    /// The CRC at the end of the frame does not match.
+    /// CRC that does not match.
     Crc,
-    /// The frame has another version of the format, or unknown flags.
+    /// Frame with another version or unknown flags.
     Version,
-    /// The message in the frame's body is invalid.
+    /// Frame with an invalid message.
     Message(MessageError),
 }
 
@@ -72,9 +73,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Encodes `message` into `out`. Returns the length including the delimiter, or 0 if a node number is too large.
-///
-/// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
+/// Encodes `message`; returns the length, 0 for an invalid address. Work linear in the length.
 pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     let len = body(out).and_then(|body| message.encode(body));
     close(header, 0, len, None, out)
@@ -104,13 +103,12 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of the buffer `out` for a frame's body. It begins after the COBS code byte and the header.
+/// Returns the part of `out` for the body.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
 
-/// Completes a frame around its body of `body` bytes: header, tag, CRC, COBS. Returns the frame's length, or 0 if
-/// `body` is `None` or an address is too large.
+/// Completes a frame; returns its length. 0 if `body` is `None` or an address is too large.
 fn close(
     header: Header,
     flags: u16,
@@ -143,7 +141,7 @@ fn close(
     stuff(out, len)
 }
 
-/// Writes `bytes` into `plain` at the offset `at`, and returns the offset of their end.
+/// Writes `bytes` at the offset `at`; returns their end.
 fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
     if let Some(place) = plain.get_mut(at..at + N) {
         place.copy_from_slice(&bytes);
@@ -154,24 +152,24 @@ fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
 /// Parsed intact frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Opened<'a> {
-    /// Header of the frame: addresses and counter.
+    /// Header: addresses and counter.
     pub header: Header,
-    /// Body of the frame: a message, or an authentication handshake.
+    /// Message or handshake.
     pub body: &'a [u8],
-    /// Bytes that the authentication tag covers: header and body.
+    /// Header and body, which the tag covers.
     pub signed: &'a [u8],
-    /// Authentication tag, not verified; `None` for a frame without a tag.
+    /// Tag, not verified; `None` without one.
     pub tag: Option<[u8; TAG]>,
-    /// True if the body is an authentication handshake and not a message.
+    /// True if the body is a handshake.
     pub handshake: bool,
 }
 
-/// Parses `plain`, a frame without COBS and delimiter. The function checks the CRC, but neither the tag nor the body.
+/// Parses `plain`, a frame without COBS and delimiter.
 ///
-/// The receiver checks the addresses before it decodes the body.
+/// Checks the CRC, but neither tag nor body.
 ///
 /// # Errors
-/// [`FrameError`]. The CRC is checked first, so every other error is about an intact frame.
+/// [`FrameError`]. The CRC is checked first.
 pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
     let (head, rest) = checked
@@ -209,7 +207,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     })
 }
 
-/// Decodes header and message of a frame: [`open`], then [`Message::decode`]. The tag is not verified.
+/// Decodes header and message; the tag is not verified.
 ///
 /// # Errors
 /// [`FrameError`]; a handshake is not a message.
@@ -227,8 +225,7 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// Encodes a frame by COBS in place, and appends the delimiter; returns the total length. The frame is at
-/// `out[1..=len]`, fewer than 254 bytes. The encoders of the crate `cobs` would need a second buffer.
+/// Encodes a frame by COBS in place; returns its length. The frame is `out[1..=len]`, under 254 bytes.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;

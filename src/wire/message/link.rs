@@ -7,7 +7,7 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, write};
 
-/// Hello message: the sender's neighbour, the nodes that it receives, its view and its mission.
+/// Hello: the sender's neighbour, received nodes, view and mission.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "eight flags of the wire format"
@@ -15,59 +15,53 @@ use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
-    /// [`digest`](crate::wire::digest::digest) of the sender's mission as loaded before flight.
+    /// [`digest`](crate::wire::digest::digest) of the mission loaded before flight.
     pub mission: u16,
-    /// Identifier of the latest view known to the sender.
+    /// Latest view known to the sender.
     pub latest_view: ViewId,
-    /// Node number of the sender's neighbour on the destination's side of the sender; 0 for none.
+    /// Sender's neighbour toward the destination; 0 for none.
     pub neighbour: u16,
-    /// True if the sender requests a hello in return.
+    /// True if the sender requests a hello.
     pub requests_reply: bool,
-    /// True if the sender requests a new view (agreed members of the chain).
+    /// True if the sender requests a new view (members).
     pub requests_view: bool,
-    /// True if the sender has restarted and has not taken part in any pass or view yet.
+    /// True if the sender has restarted and joined nothing yet.
     pub fresh: bool,
-    /// Readiness of the sender or of the destination.
+    /// Readiness of sender or destination.
     ///
-    /// - If both nodes are in the chain: true if the sender could be inserted between the destination and the neighbour
-    ///   that the destination has selected on the sender's side.
-    /// - If the sender is outside of the chain: true if it would join the chain when it is called.
-    /// - If the destination is outside of the chain: true if the destination is called to join.
+    /// - Both in the chain: the sender fits in beside the destination.
+    /// - Sender outside: it would join.
+    /// - Destination outside: it is called to join.
     pub ready: bool,
-    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are the
-    /// connected relays from the sender to the end of the chain beyond it.
+    /// Number of relays from the sender on: 1 to 1000.
     pub behind: u16,
-    /// Nodes that the sender receives on the destination's side. Bit i, 0 to 3, stands for the node whose number
-    /// differs from the sender's by i + 1.
+    /// Nodes that the sender receives toward the destination. Bit i: number differs by i + 1.
     pub hears: u8,
-    /// Identifier of the newest mission that the sender has, loaded or uploaded.
+    /// Newest mission of the sender, loaded or uploaded.
     pub latest_mission: MissionId,
-    /// True if the sender uses the mission `latest_mission` now.
+    /// True if the sender uses `latest_mission` now.
     pub active: bool,
-    /// True if all relays of the sender's view use `latest_mission`, a mission uploaded in flight.
+    /// True if all relays of the view use `latest_mission`.
     pub active_in_view: bool,
-    /// True if the sender, or a relay farther from the destination, refuses the mission `latest_mission`.
+    /// True if the sender or a relay beyond refuses `latest_mission`.
     pub refused: bool,
-    /// Flag for a node outside of the chain.
+    /// Flag for a node outside the chain.
     ///
-    /// - With `fresh`, the sender is outside of the chain, and no relay selects it.
-    /// - Without `fresh`, the destination is outside of the chain. The chain has agreed on a view without it, and the
-    ///   relays of this view are in place.
+    /// - With `fresh`: the sender is outside, and no relay selects it.
+    /// - Without: the destination is outside an agreed view that is in place.
     pub outside: bool,
-    /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
+    /// Nonce for a mission offer; 0 to accept none.
     pub offer_number: u16,
 }
 
 impl Hello {
-    /// Returns true if the sender of this hello, node `by`, receives node `of`. False for nodes more than four
-    /// numbers away.
+    /// Returns true if `by` receives `of`, within four numbers.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The eight flags share one
-    /// byte.
+    /// Encodes into `buffer`; returns the length, if it fits.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [
             self.requests_reply,
@@ -130,26 +124,22 @@ impl Hello {
     }
 }
 
-/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions along
-/// the chain, so that two nodes with the same number detect each other.
+/// Claim of a node to its number, or another's echo. It detects two nodes with the same number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim
-    /// number wins. A node draws it at its start, and raises it at most once while it is active.
+    /// Random claim number; the larger wins. Raised at most once while active.
     pub number: u32,
-    /// Last claim number received from another node with the claiming node's node number; 0 for none.
+    /// Other claim to the same number; 0 for none.
     pub other_number: u32,
-    /// True if the claiming node is passive because another node uses its node number.
+    /// True if the node is passive: another uses its number.
     pub passive: bool,
-    /// True for an echo: the sender returns a claim to the destination's node number. If two nodes have this number,
-    /// both receive the echo. So each of them learns of the other's claim.
+    /// True for an echo of a claim to the destination's number.
     pub echo: bool,
 }
 
 impl Claim {
-    /// Encodes the claim into `buffer`; returns its length, or `None` if it does not fit. Its flags from bit 0:
-    /// passive, echo.
+    /// Encodes into `buffer`; returns the length, if it fits. Flags from bit 0: passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
         let numbers = [self.number, self.other_number].map(u32::to_le_bytes);
@@ -168,8 +158,7 @@ impl Claim {
     }
 }
 
-/// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit
-/// along x that keeps two neighbours apart; `line_digest` is the digest in the message.
+/// Encodes a limit of x (fence); returns the length, if it fits.
 pub(super) fn encode_fence(line_digest: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, line_digest);
     let numbers = [fence.echo, fence.number].map(Word::new);

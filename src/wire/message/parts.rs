@@ -8,8 +8,7 @@ use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
-/// Message tags: the first byte of a body, which names the kind of message. There are three kinds of sweeps: `SWEEP`,
-/// `MEASURED` with measured interference, and `ASIDE` with a lateral offset.
+/// Message tags: the first byte of a body. `MEASURED` is a sweep with interference, `ASIDE` one with a lateral offset.
 pub(super) mod tag {
     pub(crate) const SWEEP: u8 = 0;
     pub(crate) const VERDICT: u8 = 1;
@@ -36,7 +35,7 @@ pub(super) mod tag {
     pub(crate) const REPORT: u8 = 22;
 }
 
-/// 16-bit number in two bytes; postcard would encode a `u16` as a varint.
+/// 16-bit number in two bytes, unlike postcard's varint.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(super) struct Word([u8; 2]);
 
@@ -57,14 +56,14 @@ impl Serialize for Word {
     }
 }
 
-/// Encodes `body` at the start of `buffer`; returns its length, or `None` if it does not fit.
+/// Encodes `body` into `buffer`; returns the length, if it fits.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
     postcard::to_slice(body, buffer)
         .ok()
         .map(|written| written.len())
 }
 
-/// Decodes a value from the start of `bytes`; returns the value and the remaining bytes.
+/// Decodes a value; returns it and the remaining bytes.
 pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
     postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
 }
@@ -76,9 +75,8 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Decodes a list of one number per target SIR; returns the list and the remaining bytes. The count before the list
-/// must be encoded in its shortest form: postcard accepts longer forms up to a limit that depends on the width of
-/// `usize`, so nodes could differ in the lists that they accept.
+/// Decodes one number per target; returns the rest, too. The count must be shortest: postcard's limit depends on
+/// `usize`.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -89,8 +87,7 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum of the x values and of the chain's slacks in a message, m. The last hop is limited to 1e9 m; twice this value leaves room for
-/// the sum of a position (at most 1e6 m) and that hop.
+/// Maximum of x values and slacks, m.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -120,10 +117,10 @@ pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
 
-/// Returns the position above the line at `x_m` and `altitude_m`, m, of a relay of `power_w` watts.
+/// Returns the position at y = 0.
 ///
 /// # Errors
-/// [`MessageError::Value`] if one of the three numbers is out of range.
+/// [`MessageError::Value`] if a number is out of range.
 pub(super) fn checked_place(
     [x_m, altitude_m]: [f32; 2],
     power_w: f32,
@@ -133,7 +130,7 @@ pub(super) fn checked_place(
     Ok(place)
 }
 
-/// Checks a condition on the numbers of a message.
+/// Checks a condition.
 ///
 /// # Errors
 /// [`MessageError::Value`] if the condition is false.
@@ -145,7 +142,7 @@ pub(super) const fn require(is_valid: bool) -> Result<(), MessageError> {
     }
 }
 
-/// Returns true if the lateral offset `y_m` is within -1e5 to 1e5 m.
+/// Returns true if `y_m` is within -1e5 to 1e5 m.
 pub(super) fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }
@@ -164,13 +161,13 @@ pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
         .all(|number| (least..=FARTHEST_M).contains(number))
 }
 
-/// Reason why the body of a message is rejected.
+/// Reason why a body is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum MessageError {
-    /// The encoding is invalid or not the shortest, or bytes are left over.
+    /// Encoding that is invalid, not the shortest, or too long.
     Encoding,
-    /// A number in the message is not finite or outside its range.
+    /// Number that is not finite or out of range.
     Value,
 }
 

@@ -18,37 +18,30 @@ use crate::wire::message::parts::{
     require, tag, take, take_targets, write,
 };
 
-/// Sweep message: target SIRs, and the farthest x at which the sender meets each target.
-///
-/// The message travels along the chain in a pass. "Farthest" means in the direction of the pass; at no x farther away
-/// is the target met.
+/// Target SIRs, and the farthest x that meets each.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the pass along the chain, which rises from pass to pass and wraps.
+    /// Number of the target list, rising and wrapping.
     pub number: u16,
-    /// Digest of the sender's mission and view, which the receiver compares with its own.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Target SIRs that this pass along the chain tries.
+    /// Tried target SIRs.
     pub ladder: Ladder,
-    /// Lateral offset, altitude and transmit power of the sender.
+    /// Lateral offset, altitude and power of the sender.
     pub relay: Station,
-    /// True if relays use the lateral offsets and altitudes of the joint method. False if they use the configured
-    /// values.
+    /// True for the joint method's offsets and altitudes.
     pub chosen: bool,
-    /// Measured mean of 1 / I (Upsilon) at the sender's position, in 1/W; I is the interference power. `None` if the
-    /// receiver must use the mission's interference field.
+    /// Measured Upsilon (mean of 1 / I) at the sender, 1/W.
     pub measured_per_w: Option<f32>,
-    /// Farthest x, in the direction of the pass, at which the sender meets each target SIR, m. The list begins with the
-    /// lowest target, and ends before the first target that cannot be met.
+    /// Farthest x per target, m, lowest target first. It ends before the first missed target.
     pub reaches: PerTarget,
 }
 
-/// Fields at the start of all kinds of sweep messages. The list of the sender's farthest x follows at the end.
+/// Start of all sweeps; the farthest x follow.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the other targets. A negative
-    /// sign marks a plain pass, in which every relay takes the farthest x that meets the target.
+    /// Lower middle target, or the only one; negative if plain.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -75,8 +68,7 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured interference
-    /// (Upsilon) or the lateral offset is encoded between the head and the list of farthest x.
+    /// Encodes into `buffer`; returns the length, if it fits.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -132,20 +124,18 @@ impl Sweep {
     }
 }
 
-/// Reply to a sweep message: result for each target, and the position that the destination must take.
+/// Reply to a sweep: results, and the destination's required position.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SweepVerdict {
-    /// Number of the pass along the chain, as in the sweep message that is answered.
+    /// Number of the answered sweep.
     pub number: u16,
-    /// Digest of the sender's mission and view, which the receiver compares with its own.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Verdict of the sweep: the chain's slack for each target, and the committed target, if any.
+    /// Slack for each target, and the committed target.
     pub verdict: Verdict,
-    /// x that the destination must take if a target is committed, m. `None` for the farthest x that the destination has
-    /// reported for this target.
+    /// x that the destination must take, m. `None` for its farthest x.
     pub required_x_m: Option<f32>,
-    /// True if the power or fixed altitude of some relay differs from the mission's common profile. This relay is the
-    /// sender or a later relay of the pass.
+    /// True if this or a later relay has an own power or altitude.
     pub own: bool,
 }
 
@@ -181,39 +171,37 @@ impl SweepVerdict {
     }
 }
 
-/// Maximum number of relay profiles (altitude and power) in one message.
+/// Maximum number of profiles in one message.
 pub const MOST_NAMED: usize = 8;
 
-/// Profile of a relay, altitude and power, that differs from the mission's common profile.
+/// Altitude and power of a relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Index of the relay among the members of the view, 1 next to Tx.
+    /// Index in the view, 1 next to Tx.
     pub index: u16,
-    /// Fixed altitude of the relay, m; 0 if the relay chooses its altitude.
+    /// Fixed altitude, m; 0 if the relay chooses it.
     pub held_m: f32,
-    /// Transmit power of the relay, W.
+    /// Transmit power, W.
     pub power_w: f32,
 }
 
-/// List of relay profiles (altitude and power), by rising index of the relays.
+/// Profiles of relays, by rising index.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles (altitude and power). In a pass it has those of the relays up to the sender, in
-/// the reply those of the whole chain.
+/// Altitudes and powers of relays: those so far, or all in a reply.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
-    /// Number of the pass along the chain, which rises from pass to pass and wraps.
+    /// Number of the collection, rising and wrapping.
     pub number: u16,
-    /// Digest of the sender's mission and view, which the receiver compares with its own.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Index of the last relay whose profile earlier passes collected; 0 in the first pass.
+    /// Index of the last relay collected earlier; 0 at first.
     pub after: u16,
-    /// Profiles of relays with an index above `after`. If the list is full, the next pass collects the remaining
-    /// profiles.
+    /// Profiles of relays above `after`; others follow later.
     pub seats: OwnSeats,
 }
 
-/// Relay profiles on the wire: index, altitude in m (0 if the relay chooses), and power in W.
+/// Profiles: index, altitude, m (0 if chosen), power, W.
 type SeatsBody = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
@@ -256,20 +244,20 @@ impl Roster {
     }
 }
 
-/// Token message of Algorithm 2, in which relays improve their positions one after the other.
+/// Token of Algorithm 2, which moves relays one by one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
-    /// Number of the pass along the chain, which rises from pass to pass and wraps.
+    /// Number of the token, rising and wrapping.
     pub number: u16,
-    /// Digest of the sender's mission and view, which the receiver compares with its own.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
     /// Transmit power of the sender, W.
     pub power_w: f32,
-    /// Action of each relay that receives the token in this pass.
+    /// Action of each relay that gets the token.
     pub turn: AdjustStep,
-    /// SIR of the chain's worst hop before this pass, linear; 0 if unknown.
+    /// SIR of the worst hop before, linear; 0 if unknown.
     pub sir: f32,
 }
 
@@ -298,24 +286,24 @@ impl Token {
     }
 }
 
-/// Action of each relay that receives the token of Algorithm 2.
+/// Action of a relay that gets the token.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// The relay stays, and only stores its neighbours' positions.
+    /// The relay stays, and stores its neighbours' positions.
     Look,
-    /// The relay moves if another position has a better SIR.
+    /// The relay moves if that improves its SIR.
     Move {
-        /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
+        /// Maximum change of altitude, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Search method for a better position.
+        /// Search method for the better position.
         local: Local,
     },
-    /// The relay no longer moves, because Algorithm 2 has ended.
+    /// The relay stays: Algorithm 2 has ended.
     Stop,
 }
 
-/// Action of a token on the wire: its kind, and three numbers. Numbers that the kind does not use are 0.
+/// Action: kind and three numbers; unused ones are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct StepBody {
     kind: u8,
@@ -346,8 +334,7 @@ impl StepBody {
         }
     }
 
-    /// Returns the decoded action. `None` if a value is out of range, or if a number that the action does not use is
-    /// not 0.
+    /// Returns the action; `None` if a number is invalid.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
@@ -372,18 +359,18 @@ impl StepBody {
     }
 }
 
-/// Reply to a token of Algorithm 2; relays send it back to the leader.
+/// Reply to a token, sent back to the leader.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
-    /// Number of the pass of Algorithm 2 in which the token was received.
+    /// Number of the answered token.
     pub number: u16,
-    /// Digest of the sender's mission and view, which the receiver compares with its own.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
-    /// True if the sender, or a later relay of the pass, has moved in this pass.
+    /// True if the sender or a later relay has moved.
     pub position_changed: bool,
-    /// SIR of the worst hop after the sender in the direction of the pass, linear.
+    /// SIR of the worst hop after the sender, linear.
     pub worst_sir: f32,
     /// Transmit power of the sender, W.
     pub power_w: f32,
@@ -415,30 +402,27 @@ fn is_sir(sir: f32) -> bool {
     (0.0..=f32::MAX).contains(&sir)
 }
 
-/// Length of a sensing message's body, bytes. It has the tag, the pass, the estimate, the sums, the interference level
-/// at Rx, and the excluded node.
+/// Length of a sensing message's body, bytes.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: interference estimate, and sums of measurements. In a pass the sums cover the relays up to the
-/// sender, in the reply the sender and all later relays.
+/// Interference estimate, and sums of measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
-    /// Number of the pass along the chain, which rises from pass to pass and wraps.
+    /// Number of the message, rising and wrapping.
     pub number: u16,
-    /// Digest of the sender's mission and view, which the receiver compares with its own.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Interference estimate that all relays must use.
+    /// Interference estimate that all relays use.
     pub estimate: NumberedEstimate,
-    /// Weighted sums of the relays' measurements.
+    /// Weighted sums of measurements.
     pub sums: Sums,
-    /// Interference level measured at the ground receiver Rx.
+    /// Interference level measured at Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict those of the other relays; 0 for none. Its measurements are
-    /// left out of `sums`. Set in replies only.
+    /// Node whose measurements contradict the others; 0 for none. Set in replies only.
     pub excluded: u16,
 }
 
-/// Interference estimate on the wire: its number, its kind, and four values. Values that the kind does not use are 0.
+/// Estimate: number, kind, four values; unused ones are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct EstimateBody {
     number: Word,
@@ -498,7 +482,7 @@ impl EstimateBody {
     }
 }
 
-/// Measurement sums on the wire, as two arrays of nine numbers that are encoded one after the other.
+/// Sums on the wire, as two arrays.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {
