@@ -1,53 +1,50 @@
 //! Path loss of every kind of link.
 //!
-//! Received power is transmit power / (mu d^2), with d the distance in metres (the paper's path-loss exponent of 2) and
-//! mu = C (4 pi f / c)^2. C is the excess loss by shadowing and scattering; it has one value with line of sight and one
-//! without.
+//! Received power is transmit power / (mu d^2), with d the distance in metres (the paper's path-loss exponent of 2) and mu = C (4
+//! pi f / c)^2. C is the excess loss by shadowing and scattering; it has one value with line of sight and one without.
 
 use core::f64::consts::PI;
 
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Path loss between drones and the ground.
+/// Kind of path loss between drones and the ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
-    /// Line of sight: eta is `mu_los`, as between two drones.
+    /// Line of sight between drones and the ground. Their path-loss factor eta is `mu_los`, as between two drones.
     Los,
-    /// Obstructed: eta is `mu_nlos`, as between ground stations.
+    /// Obstructed links between drones and the ground. Their path-loss factor eta is `mu_nlos`, as between two ground
+    /// stations.
     Nlos,
-    /// Partial line of sight with the weight w, 0 to 1.
-    ///
+    /// Partial line of sight with the weight w, 0 to 1. The path-loss factor of links to the ground is
     /// eta = w `mu_los` + (1 - w) `mu_nlos`.
     Weighted(f64),
 }
 
-/// Path-loss factors of the three kinds of link, 1/m^2.
-///
-/// Loss = factor x distance^2, in metres.
+/// Path-loss factors of the three kinds of link, 1/m^2 (loss = factor x distance^2, with metres).
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Channel {
-    /// Path-loss factor between two drones, 1/m^2.
+    /// Path-loss factor between two drones, which have line of sight, 1/m^2.
     mu_los: f64,
-    /// Path-loss factor from the interferer to Rx, 1/m^2; no line of sight.
+    /// Path-loss factor from the interferer to the ground receiver, without line of sight, 1/m^2.
     mu_nlos: f64,
-    /// Path-loss factor between drone and ground, 1/m^2, either direction.
+    /// Path-loss factor between a drone and the ground, 1/m^2; the same in both directions.
     eta: f64,
 }
 
-/// Reason why a channel's parameters are rejected.
+/// Reason why the parameters of the radio channel model are rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum ChannelError {
-    /// The carrier is not within 1 MHz to 1 THz.
+    /// The carrier frequency of the radio channel is not within 1 MHz to 1 THz.
     Carrier,
-    /// An excess loss is not within 1 (0 dB) to 1e20 (200 dB).
+    /// An excess loss factor is not within 1 (0 dB) to 1e20 (200 dB).
     ExcessLoss,
-    /// The loss without line of sight is smaller than that with it.
+    /// The excess loss without line of sight is smaller than the excess loss with line of sight.
     LossOrder,
-    /// The weight of the line of sight is not within 0 to 1.
+    /// The weight of the line-of-sight path in the channel model is not within 0 to 1.
     Weight,
 }
 
@@ -59,12 +56,10 @@ error_texts!(ChannelError {
 });
 
 impl Channel {
-    /// Creates a channel at `carrier_hz`, 1e6 to 1e12.
-    ///
-    /// `excess_los` and `excess_nlos` are *factors*, 1 to 1e20.
+    /// Creates a channel at `carrier_hz`, 1e6 to 1e12. The excess losses `excess_los` and `excess_nlos` are *factors*, 1 to 1e20.
     ///
     /// # Errors
-    /// [`ChannelError`] names the parameter outside its range.
+    /// [`ChannelError`] names the parameter that is outside its range.
     pub const fn new(
         carrier_hz: f64,
         excess_los: f64,
@@ -101,9 +96,9 @@ impl Channel {
         })
     }
 
-    /// Creates a channel with excess losses in dB, 0 to 200.
+    /// Creates a channel with excess losses in dB (0 to 200), as in data sheets and the paper.
     ///
-    /// It cannot be used in a constant: it computes a power of ten.
+    /// The function computes a power of ten, so it cannot be used in a constant.
     ///
     /// ```
     /// use uav_relay::Channel;
@@ -131,8 +126,8 @@ impl Channel {
         )
     }
 
-    /// Creates a channel from its factors, 1/m^2; `None` if out of range. `mu_los` is 1e-3 to 1e30, `mu_nlos` 1 to 1e20
-    /// times that, `eta` between.
+    /// Creates a channel from its path-loss factors, 1/m^2. Returns `None` unless `mu_los` is within 1e-3 to 1e30,
+    /// `mu_nlos` within 1 to 1e20 times `mu_los`, and `eta` between the two.
     pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
         let sound = (1e-3..=1e30).contains(&mu_los)
             && (mu_los..=1e20 * mu_los).contains(&mu_nlos)
@@ -144,7 +139,9 @@ impl Channel {
         })
     }
 
-    /// Returns the channel with eta clamped between the other factors.
+    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`].
+    ///
+    /// [`Channel::from_factors`] requires this. Rounding can put eta slightly outside if the two factors are equal.
     pub(crate) fn ordered(self) -> Self {
         Self {
             eta: self.eta.max(self.mu_los).min(self.mu_nlos),
@@ -152,9 +149,7 @@ impl Channel {
         }
     }
 
-    /// Path-loss factor between two drones, 1/m^2.
-    ///
-    /// At d metres from P watts a receiver gets P / (factor d^2).
+    /// Path-loss factor between two drones, 1/m^2. A receiver at d metres from P watts receives P / (factor d^2).
     pub const fn mu_los(&self) -> f64 {
         self.mu_los
     }

@@ -1,11 +1,11 @@
 //! Minimum data rate and timing of a radio channel that relays share.
 //!
-//! An idle chain sends keep-alive traffic: every half of `probe_after` a lease renewal travels to its end and back, and
-//! within `probe_after` each neighbour may request a heartbeat and receive the reply. So each pair of neighbours sends
-//! at most eight frames of about 32 bytes in `probe_after`. When a neighbour is silent, heartbeat requests are eight
-//! times as frequent, lost frames are retransmitted, and sweeps of 108 bytes travel along the chain. The eight frames
-//! may therefore take 15 % of the channel. A channel with a higher load collapses when all relays are switched on. A
-//! relay that waits longer than its retransmission timer then sends again.
+//! An idle chain sends keep-alive traffic: every half of `probe_after` a lease renewal travels to its end and back, and within
+//! `probe_after` each neighbour may request a heartbeat and receive the reply. So each pair of neighbours sends at most eight
+//! frames of about 32 bytes in `probe_after`. When a neighbour is silent, heartbeat requests are eight times as frequent, lost
+//! frames are retransmitted, and sweeps of 108 bytes travel along the chain. The eight frames may therefore take 15 % of the
+//! channel. A channel with a higher load collapses when all relays are switched on, because a relay that waits for the channel
+//! longer than its retransmission timer sends again.
 //!
 //! | input | unit |
 //! | --- | --- |
@@ -14,43 +14,47 @@
 //! | `overhead` | cost of a frame beyond its bytes (preamble, turnaround), in bytes |
 //! | `probe_after` | s, as [`Settings::probe_after`](crate::Settings::probe_after) |
 //!
-//! The figures come from chains simulated with carrier sense: up to a hundred relays in one range without losses,
-//! twenty with 30 % loss.
+//! The figures come from chains simulated with carrier sense: up to a hundred relays in one range without losses, twenty with 30
+//! % loss.
 
 use crate::time::Duration;
 use crate::wire::MAX_SWEEP;
 
-/// Frames of two neighbours within `probe_after`, while positions hold.
+/// Maximum number of frames between two neighbours of an idle chain in the time `probe_after`. A chain is idle while
+/// all relays hold their positions.
 const FRAMES: u64 = 8;
 
-/// Length of a signed lease renewal, bytes.
+/// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum part of the channel for an idle chain: 3/20.
+/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3/20. The rest is for other messages,
+/// retransmissions, and waits for a free channel.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Relays in range that find the channel free. Every further nine add one frame time.
+/// Maximum number of relays in range for which a transmission is assumed to find the channel free.
+///
+/// Every further nine relays add one frame time to each transmission. Nine relays are this relay and four on either
+/// side.
 const NEAR: u16 = 9;
 
-/// Maximum time of a transmission with wait, in frame times.
+/// Maximum time assumed for one transmission, including the wait for the channel, in frame times.
 const MOST_TURNS: u32 = 4;
 
-/// Load of a radio channel: relays that share it, and overhead per frame.
+/// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelLoad {
     /// Number of relays in range of each other, 1 to 1000.
     pub in_range: u16,
-    /// Overhead of a frame (preamble, turnaround), in bytes.
+    /// Overhead of a frame (preamble, turnaround of the radio), converted to bytes.
     pub overhead: u16,
 }
 
 impl ChannelLoad {
-    /// Creates the load of `in_range` radios as in IEEE 802.15.4.
-    ///
-    /// They sense the carrier. The overhead is 12 bytes per frame.
+    /// Creates the load of `in_range` relays whose radios sense the carrier as in IEEE 802.15.4. The overhead is 12
+    /// bytes per frame.
     pub const fn of_radios(in_range: u16) -> Self {
         Self {
             in_range,
@@ -58,14 +62,16 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the needed bits per `probe_after`, times 1e6.
+    /// Returns the bits that the channel must be able to carry in one `probe_after`, times 1e6.
+    ///
+    /// The result divided by `probe_after` in microseconds is the minimum data rate in bit/s.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
         (bits * 1_000_000 * SHARE[1]).div_ceil(SHARE[0])
     }
 
-    /// Returns the minimum data rate for this load, bit/s; 0 for one relay.
+    /// Returns the minimum data rate of a channel that carries this load, bit/s; 0 for a single relay.
     ///
     /// ```
     /// use uav_relay::{ChannelLoad, Duration};
@@ -87,9 +93,9 @@ impl ChannelLoad {
         baud
     }
 
-    /// Checks that a channel of `baud` bit/s carries this load.
+    /// Checks that a channel of `baud` bit/s carries the relays with this `probe_after`.
     ///
-    /// Used by `cargo chain`, `cargo provision` and the Linux companion.
+    /// `cargo chain`, `cargo provision` and the Linux companion use this check.
     ///
     /// ```
     /// use uav_relay::{ChannelLoad, Duration};
@@ -139,18 +145,17 @@ impl ChannelLoad {
         pairs.saturating_add(1)
     }
 
-    /// Returns the minimum `probe_after` on a channel of `baud` bit/s.
-    ///
-    /// `dead_after` should be three times this value.
+    /// Returns the minimum `probe_after` of the relays' settings on a channel of `baud` bit/s. `dead_after` should be
+    /// three times this value.
     pub const fn least_probe_after(self, baud: u32) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         Duration::from_micros(self.needed().div_ceil(baud))
     }
 
-    /// Returns the minimum [`Settings::hop_time`](crate::Settings::hop_time) at `baud` bit/s.
+    /// Returns the minimum [`Settings::hop_time`](crate::Settings::hop_time) on a channel of `baud` bit/s.
     ///
-    /// It is the time for a message of 100 bytes, with the wait for the channel, plus `latency`: from the end of the
-    /// transmission to the end of the receiver's computation.
+    /// It is the time to transmit a message of 100 bytes, including the wait for the shared channel, plus `latency`.
+    /// The latency is the time from the end of a transmission to the end of the receiver's computation.
     pub const fn hop_time(self, baud: u32, latency: Duration) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         let sweep = (MAX_SWEEP as u64 * BITS * 1_000_000).div_ceil(baud);
@@ -158,7 +163,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the time of a transmission with wait, in frame times.
+    /// Returns the time assumed for one transmission, including the wait for the channel, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -168,21 +173,19 @@ impl ChannelLoad {
     }
 }
 
-/// Error of [`ChannelLoad::carried`]: the channel is overloaded.
-///
-/// The fields say how to avoid this.
+/// Error of [`ChannelLoad::carried`]: the channel is overloaded. The fields say how to avoid this.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
-    /// Number of relays in range of each other.
+    /// Number of relays in range of each other that overload the channel.
     pub in_range: u16,
-    /// Minimum data rate for these relays, bit/s.
+    /// Minimum data rate of a channel that carries these relays, bit/s.
     pub least_baud: u32,
     /// Minimum [`Settings::probe_after`](crate::Settings::probe_after) for these relays, in whole ms.
     ///
     /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times this value.
     pub least_probe_after: Duration,
-    /// Maximum number of relays in range without a longer `probe_after`.
+    /// Maximum number of relays in range that this channel carries without a longer `probe_after`.
     pub most_in_range: u16,
 }
 

@@ -6,168 +6,150 @@
 use crate::geodetic::LineError;
 use crate::side::Side;
 
-/// Event of a relay; the firmware reads the new state from the relay.
+/// Event of a relay. The firmware reads the changed state from the relay.
 ///
-/// `node` is an index in the chain as configured before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
+/// A field `node` is a relay's index in the chain as configured before flight, as in
+/// [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Event {
-    /// `Relay::setpoint` has changed.
-    ///
-    /// Fly to the new setpoint; if there is none, hold the position.
+    /// `Relay::setpoint` has changed. Fly to the new setpoint; if there is none, hold the position.
     SetpointChanged,
-    /// The chain has agreed on positions.
-    ///
-    /// If the interference is known, also on a target SIR (`Relay::target`).
+    /// The chain has agreed on positions. If the interference is known, the chain has also agreed on a target SIR
+    /// (`Relay::target`).
     Converged,
-    /// No allowed target SIR is feasible; all relays keep their positions.
+    /// Every allowed target SIR is infeasible, and all relays keep their positions.
     ///
-    /// Raised at the leader: relay 1, or relay N in an interference field. The leader tries again after
-    /// `Relay::restart`, in a new view, or with a new mission.
+    /// Raised at the leader, which is relay 1, or relay N if the mission gives the interference as a distribution along
+    /// x. The leader tries again after `Relay::restart`, in a new view, or with a new mission.
     Infeasible,
     /// The neighbour at `side` is lost.
     ///
-    /// It was silent for at least `Settings::dead_after` (15 s by default), and left at least 16 requests unanswered.
-    /// On a lossy channel this takes up to eight times `dead_after`. With two links the relay keeps requesting
-    /// heartbeats; on a shared channel it searches for another node. An operator looks for that drone. Once it has
-    /// landed, `Relay::clear_lost` frees the space around its last position.
+    /// It has answered nothing for at least `Settings::dead_after` (15 s by default), and has left at least 16 requests
+    /// unanswered. On a channel that loses frames this takes longer, at most eight times `dead_after`. With two links
+    /// the relay keeps sending heartbeat requests to the neighbour; on a shared channel it searches for another node at
+    /// that side. An operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space around its
+    /// last position.
     NeighbourLost {
-        /// Direction of the neighbour: toward Tx or toward Rx.
+        /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the lost neighbour, 1 to N.
+        /// Index of the lost neighbour in the chain, 1 to N.
         node: u16,
     },
-    /// A lost neighbour is received again, or another node replaces it.
-    ///
-    /// If replaced, `node` differs from the node reported lost.
+    /// A lost neighbour is received again, or another node has replaced it. In the second case `node` differs from
+    /// the node that was reported lost.
     NeighbourBack {
-        /// Direction of the neighbour: toward Tx or toward Rx.
+        /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the neighbour received now.
+        /// Index of the neighbour that is received now.
         node: u16,
     },
-    /// A node has reported eight times in a row that it does not receive this relay.
-    ///
-    /// It cannot be a neighbour. Not raised again before it has received this relay. An operator checks this relay's
-    /// transmitter and the node's receiver.
+    /// A node has reported eight times in a row that it does not receive this relay. The node therefore cannot be a
+    /// neighbour. Not raised again before the node has received this relay. An operator checks this relay's
+    /// transmitter and the node's receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node's mission differs, or this relay cannot obtain it.
-    ///
-    /// The node's messages are ignored. An operator loads the same mission into both nodes before take-off. Raised once
-    /// a minute for each node.
+    /// A node's mission differs from this relay's, or this relay cannot obtain it. The node's messages are ignored.
+    /// An operator loads the same mission into both nodes before take-off. Raised once a minute for each node.
     MissionMismatch {
         /// Index of the node with the other mission.
         node: u16,
     },
     /// A node signs its handshakes with another key than this relay.
     ///
-    /// Raised after three such handshakes in a row; one with the right key restarts the count. An operator should give
-    /// both nodes the same key. An attacker without the key can raise this event with three forged handshakes in a row.
-    /// If the node is received at the same time, it is an attack and the node is fine.
+    /// Raised after three such handshakes in a row; a handshake with the right key starts the count again. An operator
+    /// should give both nodes the same key. An attacker without the key can raise this event with three forged
+    /// handshakes in a row, but not with one forged frame. If the node is received at the same time, this is an attack
+    /// and the node is fine.
     KeyMismatch {
-        /// Index of the node with another key.
+        /// Index of the node that signs with another key.
         node: u16,
     },
-    /// Five handshakes in a row from a node have an old epoch (start counter).
+    /// Five handshakes in a row from a node have an old epoch (start counter). The node's frames are rejected.
     ///
-    /// The key is right, but the node's frames are rejected. Its epoch is smaller than the last known one, or equal
-    /// with the same seed. A handshake with a newer epoch restarts the count. An operator increases the node's epoch
-    /// and restarts it, or restarts this relay and its other neighbours. A replay of five handshakes of one start, in
-    /// order, raises the event; a single frame does not. If `node` is this relay, its neighbours know a newer epoch,
-    /// and this relay becomes passive ([`Event::DuplicateIndex`]).
+    /// The key is right, but the node did not increase its epoch at its last start. The epoch is smaller than the last
+    /// known one, or equal with the same seed. A handshake with a newer epoch starts the count again. An operator
+    /// increases the node's epoch and restarts it, or restarts this relay and its other neighbours. A replay of one
+    /// recorded frame does not raise the event, but a replay in order of five handshakes of one start does. If `node`
+    /// is this relay, its neighbours know a newer epoch, and this relay becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
-        /// Index of the node with the old epoch.
+        /// Index of the node whose epoch went back.
         node: u16,
     },
-    /// Two nodes use the same index.
-    ///
-    /// If it is this relay's index, at most one of the two has a setpoint (see `Relay::is_passive`). If it is a
-    /// neighbour's, that index is received at both ports. An operator lands one of the two and gives it the right
-    /// index. Not raised again before the other node was silent for twice `dead_after`. With signed frames, an attacker
-    /// without the key can raise this event, but do no more.
+    /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
+    /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of the
+    /// two nodes and gives it the right index. Not raised again before the other node has been silent for twice
+    /// `dead_after`. With signed frames, an attacker without the key can raise this event, but cannot do more.
     DuplicateIndex {
         /// Index that two nodes use.
         node: u16,
     },
-    /// The chain has agreed on its members (a new view).
-    ///
-    /// `Relay::view`, `Relay::index` and the relays of `Relay::mission` have changed. New positions follow.
+    /// The chain has agreed on its members (a new view). `Relay::view`, `Relay::index` and the relays of
+    /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired.
-    ///
-    /// Other relays may no longer use the last agreement. The relay keeps its setpoint and requests a new view. Not
-    /// raised again before a view is agreed on.
+    /// The lease has expired. The relay keeps its setpoint and requests a new view, because other relays may no longer
+    /// use the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused: too few relays are reachable for a quorum.
-    ///
-    /// This part of the chain holds its positions. Not raised again before a view is agreed on. Bring the missing
-    /// relays back into range, or land this part's drones.
+    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
+    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land the
+    /// drones of this part.
     NoQuorum,
-    /// A newer mission has been received (`Relay::upload`).
-    ///
-    /// Store it, and give it to `Relay::resume` after the next start.
+    /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
-    /// A newer mission was rejected; this relay keeps its present one.
+    /// A newer mission was rejected, and this relay keeps its present mission. The ground station is informed.
     ///
-    /// The ground station is informed. The mission's distance does not fit its Tx and Rx positions on earth, or it
-    /// exceeds this relay's own geofence, or the settings do not allow its time slots. Upload a mission without this
-    /// error. Raised once for each such mission.
+    /// The reason is one of three. The mission's distance does not fit its Tx and Rx positions on earth. The mission
+    /// exceeds this relay's own geofence. Or it has fitted slots (as long as each hop needs) that the settings do not
+    /// allow. Upload a mission without this error. Raised once for each such mission.
     UploadRefused {
         /// Reason for the rejection.
         why: LineError,
     },
-    /// The estimate of the interference has changed.
-    ///
-    /// Read `Relay::interference_estimate`. New positions follow.
+    /// The relay's estimate of the interference has changed (`Relay::interference_estimate`). New positions follow.
     NewEstimate,
-    /// The measurements fit no single source on the ground.
-    ///
-    /// Or they are too few, or contradict each other. Raised at the leader. `Relay::unfit` gives the reason.
+    /// The measurements do not fit a single source on the ground, are too few or contradict each other. Raised at the
+    /// leader. `Relay::unfit` gives the reason.
     InterfererUnclear,
-    /// A node's measurements do not fit the others; they are ignored.
+    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit.
     ///
-    /// They count again once they fit. An operator should check the node's receiver. For Tx and Rx only the leader
-    /// raises this event. A relay that measures nothing at all raises it alone. With four relays or fewer the faulty
-    /// relay cannot be identified ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
+    /// An operator should check the receiver of this node. Only the leader raises this event for the transmitter and
+    /// the receiver. A relay that measures nothing at all raises it itself, and no other node does. With four relays or
+    /// fewer the faulty relay cannot be identified
+    /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
-        /// Index of the node: 0 for Tx, number of configured relays + 1 for Rx.
+        /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,
     },
-    /// The chain flies the uploaded mission.
-    ///
-    /// `Relay::mission`, `Relay::version` and `Relay::sites` have changed. New positions follow.
+    /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
+    /// positions follow.
     Adopted,
-    /// The relay is outside the chain, as requested by `Relay::leave`.
-    ///
-    /// The others have closed the gap: this drone may fly away.
+    /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap, and
+    /// this relay's drone may fly away.
     MayLeave,
-    /// The drone's remaining time of flight is unknown.
+    /// The drone's remaining time of flight is unknown. Raised only with a reserve (`Relay::set_reserve`).
     ///
-    /// Raised only with a reserve (`Relay::set_reserve`): if `Relay::handle_endurance` got an invalid value, or none
-    /// for 10 s, or if none is known while the relay controls the drone. The relay counts down from the last value that
-    /// agreed with the one before, or else from the last. Without any valid value it does not leave the chain by
-    /// itself. Raised at most once a minute.
+    /// Raised if a value of `Relay::handle_endurance` was invalid, if none came for 10 s, or if none is known while the
+    /// relay controls the drone. The relay then counts down from the last value that agreed with the value before it,
+    /// or else from the last value. Without any valid value the relay does not leave the chain by itself. Raised at
+    /// most once a minute while the time is unknown.
     EnduranceUnknown,
-    /// The remaining flight time is only the way home and the reserve.
-    ///
-    /// See `Relay::set_reserve`. Raised again every minute while that lasts.
+    /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while that lasts.
     AtReserve,
-    /// Permission to fly away, given to a node outside the chain.
+    /// A node outside of the chain was told by this relay that the node's drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event
     /// may be repeated.
     MayLeaveTold {
-        /// Direction of the node: toward Tx or toward Rx.
+        /// Side of this relay on which the node is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the node whose drone may leave.
+        /// Index of the node whose drone is permitted to leave.
         node: u16,
     },
 }
 
-/// Events polled before those about a node; `POLLED_LAST` come after.
+/// Events without a node that the firmware polls first. Events about a node come next, then `POLLED_LAST`.
 const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,
@@ -201,7 +183,7 @@ const POLLED_LAST: &[Event] = &[
     Event::AtReserve,
 ];
 
-/// Event about one node toward Tx or toward Rx.
+/// Kind of event that concerns one node on one side of this relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum NodeEvent {
     Lost,
@@ -210,9 +192,9 @@ pub(crate) enum NodeEvent {
     Mission,
     Key,
     Epoch,
-    /// Two nodes use the same index. The direction is meaningless for this relay's own index.
+    /// Two nodes use the same index. The event's side has no meaning if it is this relay's index.
     Index,
-    /// The node's measurements do not fit those of others.
+    /// The measurements of the node do not fit those of the other nodes.
     Sensor,
     #[cfg(feature = "departures")]
     MayLeaveTold,
@@ -248,11 +230,12 @@ impl NodeEvent {
     }
 }
 
-/// Raised events that the firmware has not polled yet.
+/// Raised events that the firmware has not polled yet, with the nodes that they concern.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     events: u32,
-    /// Raised events about a node: entry 0 toward Tx, entry 1 toward Rx. Bit i stands for `NodeEvent::ALL[i]`.
+    /// Raised events that concern a node on one side. Entry 0 is for the upstream side, entry 1 for the downstream
+    /// side. Bit i stands for `NodeEvent::ALL[i]`.
     kinds: [u16; 2],
     nodes: [[u16; NodeEvent::ALL.len()]; 2],
 }
@@ -272,7 +255,7 @@ impl Pending {
         self.events |= Self::bit(event);
     }
 
-    /// Raises an event. It replaces one of the same kind and side.
+    /// Raises an event about `node` at `side`. It replaces an event of the same kind and side about another node.
     pub(crate) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         let at = usize::from(side == Side::Downstream);
         let (Some(bits), Some(nodes)) = (self.kinds.get_mut(at), self.nodes.get_mut(at)) else {

@@ -3,9 +3,9 @@
 //! [`Sites`] are the positions of transmitter and receiver on earth. A [`LineError`] is the reason why a relay rejects
 //! a mission.
 
-/// Geodetic position: WGS84 latitude, longitude, and height above sea level.
+/// Geodetic position: WGS84 latitude and longitude, and height above mean sea level.
 ///
-/// A step of 1 in `lat_e7` is 1.1 cm on the ground, in `lon_e7` at most 1.1 cm.
+/// A step of 1 in `lat_e7` is 1.1 cm on the ground, a step of 1 in `lon_e7` at most 1.1 cm.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geodetic {
@@ -13,15 +13,14 @@ pub struct Geodetic {
     pub lat_e7: i32,
     /// Longitude, 10⁻⁷ degrees, east above 0: in [-1 800 000 000, 1 800 000 000].
     pub lon_e7: i32,
-    /// Height above mean sea level (AMSL), mm.
+    /// Height above the mean sea level (AMSL), mm.
     pub amsl_mm: i32,
 }
 
 impl Geodetic {
-    /// Returns the nearest position; `None` if a value is out of range.
+    /// Returns the position nearest to these values; `None` if a value is not finite or out of range.
     ///
-    /// Latitude and longitude are in degrees, the height above mean sea level in m, within 1e6. `None` also for a value
-    /// that is not finite.
+    /// Latitude and longitude are in degrees, and the height above mean sea level in m, within 1e6.
     ///
     /// ```
     /// use uav_relay::Geodetic;
@@ -39,7 +38,7 @@ impl Geodetic {
         })
     }
 
-    /// Returns true if latitude and longitude are in range.
+    /// Returns true if latitude and longitude are within their ranges.
     pub const fn is_valid(self) -> bool {
         self.lat_e7.unsigned_abs() <= 900_000_000 && self.lon_e7.unsigned_abs() <= 1_800_000_000
     }
@@ -55,13 +54,13 @@ pub(crate) fn to_integer(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
-/// Surveyed positions of Tx and Rx on the ground.
+/// Surveyed positions of the transmitter Tx and the receiver Rx on the ground.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sites {
-    /// Position of Tx.
+    /// Position of the transmitter Tx on earth.
     pub tx: Geodetic,
-    /// Position of Rx.
+    /// Position of the receiver Rx on earth.
     pub rx: Geodetic,
 }
 
@@ -69,7 +68,7 @@ pub struct Sites {
 pub(crate) const SITES_LENGTH: usize = 24;
 
 impl Sites {
-    /// Encodes Tx, then Rx, as little-endian integers.
+    /// Encodes latitude, longitude and height of the transmitter, then of the receiver. Each takes four little-endian bytes.
     pub(crate) fn to_bytes(self) -> [u8; SITES_LENGTH] {
         let Self { tx, rx } = self;
         let numbers = [
@@ -104,27 +103,25 @@ impl Sites {
     }
 }
 
-/// Reason why a relay rejects an uploaded mission.
+/// Reason why a relay rejects an uploaded mission: its Tx and Rx positions, its slots, or the geofence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance is not that between its Tx and Rx positions.
-    ///
-    /// A mission without such positions is compared with the configured ones (`Settings::sited`).
+    /// The mission's distance differs from the distance between its Tx and Rx positions. A mission without such
+    /// positions is compared with the positions that the relay was configured with (`Settings::sited`).
     Distance,
-    /// Tx and Rx are less than 10 m or more than 100 km from each other.
+    /// The mission's Tx and Rx positions are less than 10 m or more than 100 km apart.
     Sites,
-    /// The range of altitudes exceeds the relay's own geofence.
-    ///
-    /// See [`GuardConfig::geofence`](crate::guard::config::GuardConfig).
+    /// The mission's range of altitudes exceeds the relay's own geofence. See
+    /// [`GuardConfig::geofence`](crate::guard::config::GuardConfig).
     Altitude,
-    /// The range of lateral offsets exceeds the relay's own geofence.
+    /// The mission's range of lateral offsets exceeds the relay's own geofence.
     Lateral,
-    /// The distance from Tx to Rx exceeds the relay's own geofence.
+    /// The mission's distance from transmitter to receiver exceeds the relay's own geofence.
     Length,
-    /// The relay cannot fly time slots as long as hops need (`fitted_gap`).
+    /// The mission has fitted slots (`fitted_gap` above 0), which this relay cannot fly.
     ///
-    /// They need the method `Joint`, no `Settings::listen`, and a known interferer.
+    /// Fitted slots need the method `Joint`, no `Settings::listen`, and a known interferer.
     Slots,
 }
 

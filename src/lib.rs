@@ -13,12 +13,14 @@
     )
 )]
 
-/// Implements `Display`, `Error` and `defmt::Format` for an error enum. `defmt` accepts string literals only, and keeps
-/// them out of flash.
+/// Implements `Display`, `Error` and `defmt::Format` for an error enum, from one text for each variant.
+///
+/// The texts are string literals, because `defmt` accepts nothing else. They take no flash: an image stores only their
+/// numbers. The function `text` returns them; it is a `const fn`, so a `const fn` that panics can use it.
 macro_rules! error_texts {
     ($type:ty { $($variant:ident => $text:literal),* $(,)? }) => {
         impl $type {
-            /// Returns what is wrong, and the allowed range.
+            /// Returns the error's text: what is wrong, and the allowed range.
             pub(crate) const fn text(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)*
@@ -105,7 +107,9 @@ mod wire;
 #[doc(hidden)]
 pub mod wire;
 
-/// Features of this build. Code behind a false one takes no flash.
+/// Features of this build: a constant is true if the crate is built with its feature.
+///
+/// Code that a false constant makes unreachable is compiled, and takes no flash.
 mod features {
     pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
     pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");

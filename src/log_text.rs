@@ -1,5 +1,4 @@
-//! Texts that `defmt` prints for events and their reasons. An image stores their numbers only, so the texts take no
-//! flash.
+//! Texts that `defmt` prints for events and their reasons. An image stores their numbers only, so the texts take no flash.
 
 #![expect(
     clippy::match_same_arms,
@@ -9,7 +8,7 @@
 use crate::event::Event;
 use crate::side::Side;
 
-/// Implements `defmt::Format` for an enum: one text per variant.
+/// Implements `defmt::Format` for an enum, with one text for each variant.
 macro_rules! texts {
     ($type:ty { $($variant:pat => $text:literal),* $(,)? }) => {
         impl defmt::Format for $type {
@@ -37,7 +36,7 @@ impl defmt::Format for Event {
     }
 }
 
-/// Returns the node of an event, if any.
+/// Returns the index of the node that the event concerns; `None` if the event concerns no node.
 const fn node(event: Event) -> Option<u16> {
     match event {
         Event::NeighbourLost { node, .. }
@@ -53,7 +52,8 @@ const fn node(event: Event) -> Option<u16> {
     }
 }
 
-/// Returns the log text of an event; its node comes before.
+/// Returns the text of an event in a log line. For an event about a node, the log line has the node's number before the
+/// text.
 fn text(event: Event) -> defmt::Str {
     match event {
         Event::SetpointChanged => defmt::intern!("the setpoint has changed"),
@@ -126,7 +126,7 @@ fn text(event: Event) -> defmt::Str {
     }
 }
 
-/// Log texts of the autopilot: states, modes, events and reasons.
+/// Log texts of the autopilot's states, modes and events, and the reasons for lost or denied control.
 #[cfg(feature = "flight")]
 mod autopilot {
     use crate::flight::autopilot::state::{FlightMode, Release, ReleaseCause, State, WaitReason};
@@ -233,7 +233,7 @@ mod autopilot {
         }
     }
 
-    /// Returns the entries before the first 0.
+    /// Returns the entries of `relays` before the first 0. Unused entries are 0.
     fn named(relays: &[u16]) -> &[u16] {
         relays.split(|node| *node == 0).next().unwrap_or_default()
     }

@@ -2,7 +2,7 @@
 
 /// Position in the air.
 ///
-/// x runs along the ground from Tx toward Rx, y to its right seen from above, h up.
+/// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
 ///
 /// ```
 /// use uav_relay::Placement;
@@ -14,21 +14,21 @@
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Placement {
-    /// Distance from Tx along the ground, m: 0 to D, that of Rx.
+    /// Distance from the transmitter along the ground, m: 0 to D, the distance from Tx to Rx.
     pub x_m: f32,
-    /// Lateral offset, m: positive to the right, seen from Tx toward Rx.
+    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
     pub y_m: f32,
-    /// Height above the ground, m.
+    /// Height of the position above the ground, m.
     pub altitude_m: f32,
 }
 
 impl Placement {
-    /// Creates the position with the lateral offset 0.
+    /// Creates the position right above the line from transmitter to receiver: the lateral offset is 0.
     pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
         CrossSection::on_line(altitude_m).at(x_m)
     }
 
-    /// Returns the lateral offset and altitude.
+    /// Returns the lateral offset and altitude of the position, without its x.
     #[doc(hidden)]
     pub const fn cross_section(self) -> CrossSection {
         CrossSection {
@@ -38,18 +38,18 @@ impl Placement {
     }
 }
 
-/// Lateral offset and altitude: a position without x.
+/// Lateral offset and altitude of a relay: its position without x.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
-    /// Lateral offset, m: positive to the right, seen from Tx toward Rx.
+    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
     pub y_m: f32,
-    /// Height above the ground, m.
+    /// Height of the relay above the ground, m.
     pub altitude_m: f32,
 }
 
 impl CrossSection {
-    /// Creates the cross-section with the lateral offset 0.
+    /// Creates the cross-section right above the line from Tx to Rx: the lateral offset is 0.
     pub const fn on_line(altitude_m: f32) -> Self {
         Self {
             y_m: 0.0,
@@ -57,7 +57,7 @@ impl CrossSection {
         }
     }
 
-    /// Returns the position at `x_m`.
+    /// Returns the position at `x_m` with this lateral offset and altitude.
     pub const fn at(self, x_m: f32) -> Placement {
         Placement {
             x_m,
@@ -72,34 +72,32 @@ impl CrossSection {
     }
 }
 
-/// Lateral offset, altitude and power of a relay without its x.
+/// Lateral offset, altitude and transmit power of a relay. Its x is not given but computed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {
-    /// Lateral offset and altitude.
+    /// Lateral offset and altitude of the relay.
     pub cross_section: CrossSection,
-    /// Transmit power, W.
+    /// Transmit power of the relay, W.
     pub power_w: f32,
 }
 
-/// Behaviour of a relay that reaches too few others for a quorum.
+/// Behaviour of a relay while it can reach too few relays for a quorum of the chain.
 ///
-/// [`Leave`](Self::Leave) moves the drone out of the way of the relays with a quorum. Set the same value on all relays:
-/// those that leave keep their order and distances.
+/// [`Leave`](Self::Leave) moves the drone out of the way of the relays that have a quorum. Set the same value on all
+/// relays. Relays that leave the line then keep their order and distances.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
-    /// Hold the last agreed position.
+    /// Hold the last position that the chain has agreed on.
     #[default]
     Hold,
-    /// Fly sideways (along y) and upward from the last agreed position.
-    ///
-    /// A guard keeps the drone in its geofence
-    /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
+    /// Leave the line from Tx to Rx: fly sideways (along y) and upward from the last agreed position. A guard keeps the
+    /// drone in its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
-        /// Change of the lateral offset, m: -1e4 to 1e4.
+        /// Lateral offset that is added to the last position that the chain has agreed on, m: -1e4 to 1e4.
         y_m: f32,
-        /// Change of the altitude, m: 0 to 1e4.
+        /// Height that is added to the last position that the chain has agreed on, m: 0 to 1e4.
         up_m: f32,
     },
 }
@@ -112,7 +110,8 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the waiting position; `place` is the last agreed one.
+    /// Returns the position at which a drone waits while its relay has no quorum. `place` is the last position that the
+    /// chain has agreed on.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

@@ -11,23 +11,22 @@ use crate::place::Placement;
 
 /// Direction and distance of a position relative to a relay.
 ///
-/// x runs toward Rx, y to its right seen from above, h up. The frame is left-handed, as in the paper: azimuth grows
-/// clockwise. The pointing error of both angles is at most 0.23 degrees.
+/// Frame: x toward the receiver, y to the right of x as seen from above, h up. So the frame is left-handed, as in the
+/// paper, and azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {
-    /// Angle in the ground plane from x toward y, rad, within -pi to pi.
-    ///
-    /// 0 for a position straight above or below the relay.
+    /// Angle in the ground plane from x toward y, rad, within -pi to pi. The angle is 0 for a position straight above
+    /// or below the relay.
     pub azimuth_rad: f32,
-    /// Angle above the horizon, rad, within -pi/2 to pi/2.
+    /// Elevation: angle of the direction above the horizon, rad, within -pi/2 to pi/2.
     pub elevation_rad: f32,
     /// Straight distance to the position, m, above 0; relative error below 3e-7.
     pub distance_m: f32,
 }
 
 impl Bearing {
-    /// Returns the bearing of a position `ahead_m` along x, `aside_m` along y, `climb_m` up.
+    /// Returns the bearing of a position `ahead_m` farther along x, `aside_m` along y, and `climb_m` up.
     ///
     /// `None` if the distance is zero or overflows, or if a value is not finite.
     ///
@@ -45,9 +44,9 @@ impl Bearing {
         })
     }
 
-    /// Returns the bearing of `to` seen from `from`; `None` if equal.
+    /// Returns the bearing of `to` seen from `from`; `None` if both are equal.
     ///
-    /// Ground stations are placements too, at altitude 0.
+    /// The ground stations are placements too, at altitude 0.
     ///
     /// ```
     /// use uav_relay::Placement;
@@ -66,10 +65,11 @@ impl Bearing {
         )
     }
 
-    /// Returns the bearing of the mission's interferer seen from `from`.
+    /// Returns azimuth, elevation and distance of the mission's interferer as seen from `from`.
     ///
-    /// The interferer is on the ground. A directional antenna can steer a null toward it. `None` at the interferer's
-    /// position, or if the interference has no position.
+    /// The interferer is on the ground. A directional antenna can steer a null toward it.
+    ///
+    /// The result is `None` if the relay is at the interferer's position, or the interference has no position.
     pub fn to_interferer(from: Placement, mission: &Mission) -> Option<Self> {
         let interferer = mission.interferer()?;
         Self::new(
@@ -80,7 +80,7 @@ impl Bearing {
     }
 }
 
-/// Returns sqrt(a^2 + b^2) without overflow or underflow.
+/// Returns sqrt(a^2 + b^2), without overflow or underflow of the squares.
 fn length(a: f32, b: f32) -> f32 {
     let large = a.abs().max(b.abs());
     if large > 0.0 {
@@ -91,7 +91,8 @@ fn length(a: f32, b: f32) -> f32 {
     }
 }
 
-/// Returns the angle of (`adjacent`, `opposite`), rad; 0 if both are 0.
+/// Returns the angle whose tangent is `opposite` / `adjacent`, rad. The two signs give the quadrant. 0 if both
+/// arguments are 0.
 fn angle(opposite: f32, adjacent: f32) -> f32 {
     let large = opposite.abs().max(adjacent.abs());
     if large > 0.0 {

@@ -12,10 +12,10 @@ use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
 
-/// Time for computation and buffers in the presets of `hop_time`.
+/// Time for computation and the link's buffers in the `hop_time` of the preset settings.
 const LATENCY: Duration = Duration::from_millis(10);
 
-/// Network and index of a relay.
+/// Identity of a relay: its network's number, and its index in the chain.
 ///
 /// ```
 /// use uav_relay::Identity;
@@ -29,18 +29,18 @@ const LATENCY: Duration = Duration::from_millis(10);
 pub struct Identity {
     /// Number of the network; frames of other networks are ignored.
     pub network: u16,
-    /// Index in the chain, from 1 (next to Tx) to N.
+    /// Index of this relay in the chain, from 1 (next to the transmitter) to N.
     pub index: u16,
 }
 
-/// Connection between a relay and its neighbours.
+/// Kind of connection between a relay and its neighbours.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Wiring {
     /// Separate link to each neighbour: two serial ports.
     #[default]
     Pair,
-    /// Single channel that both neighbours receive: one radio.
+    /// Single channel that both neighbours, and perhaps other relays, receive: one radio.
     Shared,
 }
 
@@ -48,37 +48,33 @@ pub enum Wiring {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Method {
-    /// Optimise x by the paper's Algorithm 1; y and altitude are given.
-    ///
-    /// In an interference field Algorithm 4 is used.
+    /// Optimise x at given lateral offsets and altitudes by the paper's Algorithm 1. If the mission gives the
+    /// interference as a distribution along x (an interference field), use Algorithm 4.
     #[default]
     Align,
-    /// Optimise x, y and altitude jointly, within the mission's ranges.
-    ///
-    /// For up to 100 relays; not for an interference field.
+    /// Optimise x, y and altitude jointly, within the mission's ranges. This method is for up to 100 relays, and not
+    /// for a mission that gives the interference as a distribution along x.
     Joint,
-    /// Optimise x by Algorithm 1, then move single relays by Algorithm 2.
-    ///
-    /// Not for an interference field.
+    /// Optimise x by the paper's Algorithm 1, then move one relay after the other by Algorithm 2. This method is not
+    /// for a mission that gives the interference as a distribution along x.
     Adjust(Adjust),
 }
 
-/// Parameters of the paper's Algorithm 2, which moves relays one by one.
+/// Parameters of the paper's Algorithm 2, which moves one relay after the other to a better position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
-    /// Maximum number of rounds, the paper's `Iter_max`.
-    ///
-    /// In a round every relay may move once. Algorithm 2 ends after a round without a move.
+    /// Maximum number of rounds, the paper's `Iter_max`. In a round every relay may move once. Algorithm 2 ends after a
+    /// round in which no relay moves.
     pub rounds: u16,
-    /// Maximum change of altitude per move, m: 0 to 1e5; the paper's `epsilon_h`.
+    /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
     /// Search method for a relay's better position.
     pub local: Local,
 }
 
 impl Default for Adjust {
-    /// Returns the defaults: 500 rounds, up to 10 m, [`Local::Fine`].
+    /// Returns the defaults: 500 rounds, altitude changes of up to 10 m, [`Local::Fine`].
     fn default() -> Self {
         Self {
             rounds: 500,
@@ -88,21 +84,18 @@ impl Default for Adjust {
     }
 }
 
-/// Settings of a relay that measures the interference itself.
-///
-/// They are for a mission with an interference field.
+/// Settings of a relay that measures the interference itself. They are for a mission that gives the interference as a
+/// distribution along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measure {
-    /// Largest valid interference power of a sample, W: 1e-30 to 1e6.
-    ///
-    /// Samples above it are rejected.
+    /// Largest valid interference power of a sample, W: 1e-30 to 1e6. Samples with a larger power are rejected.
     pub i_max_w: f32,
-    /// Samples per position and estimate: 100 to 1 000 000.
+    /// Number of samples at one position from which an estimate is made, 100 to 1 000 000.
     pub samples: u32,
 }
 
-/// Settings of a relay, chosen by its firmware.
+/// Settings of a relay, which its firmware chooses.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -118,90 +111,80 @@ pub struct Measure {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// Altitude and power of this relay; `None` for the mission's values.
+    /// Altitude and power of this relay; `None` for the values that the mission gives.
     pub profile: Option<Profile>,
-    /// True to keep this relay's altitude while others' are optimised.
+    /// True to keep this relay's altitude fixed while the method optimises other relays' altitudes.
     pub hold_altitude: bool,
-    /// Method that the leader runs; the other relays follow.
-    ///
-    /// The leader is relay 1, or relay N in an interference field.
+    /// Method that the leader runs; the other relays follow. The leader is relay 1, or relay N if the mission gives
+    /// the interference as a distribution along x.
     pub method: Method,
-    /// Measurement of the interference by this relay; `None` for none.
-    ///
-    /// The measurements replace the mission's interference field. Use `None` for a mission without a field.
+    /// Measurement of the interference by this relay; `None` for no measurement. The measured interference replaces
+    /// the distribution along x that the mission gives. Use `None` if the mission gives no such distribution.
     pub measure: Option<Measure>,
-    /// Estimation of an unknown interferer from measurements; `None` for none.
-    ///
-    /// It must be `None` in an interference field. Set it on all relays or on none.
+    /// Estimation of an unknown interferer from measurements; `None` for no estimation. It must be `None` if the
+    /// mission gives the interference as a distribution along x. Set it on all relays of a chain, or on none.
     pub listen: Option<Listen>,
-    /// Order of the target SIRs that the leader tries.
+    /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first predicts the target SIR from the mission.
-    ///
-    /// A right prediction needs one round trip of messages along the chain. Effective only with the bracketed schedule.
+    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one round
+    /// trip of messages along the chain is enough. It has an effect only with the bracketed schedule.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
-    /// Key and epoch for signing frames.
-    ///
-    /// With a key the relay accepts signed frames only; without one, frames of any sender. Give the key to all relays
-    /// of a network, or to none.
+    /// Key and epoch for signing frames. With a key the relay accepts signed frames only; without one, it accepts
+    /// frames from any sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
-    /// Maximum time from `poll_transmit` here to that of the next relay.
-    ///
-    /// Above 0. For a message of 100 bytes, computation included; longer messages scale it up.
+    /// Maximum time from `poll_transmit` at one relay to `poll_transmit` at the next relay; above 0. The time is for
+    /// a message of 100 bytes (a sweep), and includes the computation. For longer messages it is scaled up.
     pub hop_time: Duration,
-    /// Silence of a neighbour before heartbeats are requested; above 0.
-    ///
-    /// The relay sends 16 requests until `dead_after`, more on a lossy channel.
+    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. It sends 16 requests until
+    /// `dead_after`, and more on a channel that loses frames.
     pub probe_after: Duration,
-    /// Minimum silence before a neighbour counts as lost.
-    ///
-    /// Above `probe_after`. It is also the minimum duration of a lease.
+    /// Minimum silence after which a neighbour counts as lost, and minimum duration of a lease. Above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of the chain needs a quorum to continue alone.
-    ///
-    /// A quorum is more than half of the previous view's members, or exactly half including the view's proposer.
-    /// Without this rule, parts of a split chain would interfere with each other.
+    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the previous view's
+    /// members, or exactly half including the view's proposer. Without this rule, the parts of a split chain would
+    /// interfere with each other.
     pub quorum: bool,
-    /// Behaviour while too few relays are reachable for a quorum.
+    /// Behaviour of the relay while too few relays are reachable for a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Guard against collisions, with a geofence; `None` for no guard.
-    ///
-    /// With a guard the firmware has to report the drone's position: `Relay::handle_position`.
+    /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With a guard the
+    /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// Duration of the move to a new agreed position (feature `departures`).
+    /// Duration of the move to a new position on which the chain has agreed (feature `departures`). The setpoint moves
+    /// in 32 equal steps; with 0 it moves in one step.
     ///
-    /// The setpoint moves in 32 equal steps; with 0 in one step. If all drones arrive together, no hop is worse on the
-    /// way than before or after ([`docs::batteries`](crate::docs::batteries)). The longest move is about the distance
-    /// between neighbours: choose the duration for the usual speed or less. Use the same value on all relays, at most
-    /// four times `dead_after`.
+    /// If all drones arrive together, no hop is worse on the way than before or after
+    /// ([`docs::batteries`](crate::docs::batteries)). The longest way is about a spacing of the chain. Choose the
+    /// duration so that drones fly it at their usual speed or slower. Use the same value for all relays of a chain, at
+    /// most four times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
-    /// True if a relay without a guard may leave the chain (`Relay::leave`).
-    ///
-    /// Its neighbours then fly close to its waiting drone. At an end of the chain they come within a few metres.
+    /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
+    /// its drone, which still waits at its place. At an end of the chain they come as close as a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
-    /// True if the firmware converts setpoints with surveyed Tx and Rx positions.
-    ///
-    /// An uploaded mission without Tx and Rx positions must then have the surveyed distance. Otherwise it is rejected.
-    /// Set it on all relays or on none.
+    /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
+    /// mission without Tx and Rx positions is then rejected if its distance differs from that of the surveyed ones. Set
+    /// it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
 impl Default for Settings {
-    /// Returns the default settings, for links of 57 600 baud or faster.
+    /// Returns the default settings, for a link of 57 600 baud or faster to each neighbour.
     ///
-    /// The method is [`Method::Align`], the paper's Algorithm 1. The leader predicts the target SIR; after a wrong
-    /// prediction it searches by [`Schedule::Bracketed`]. A neighbour is lost after 15 s of silence.
+    /// The relays compute their positions by [`Method::Align`], the paper's Algorithm 1. The leader predicts the
+    /// highest target SIR that the chain can meet, and searches by [`Schedule::Bracketed`] if the prediction is
+    /// wrong. A neighbour is lost after 15 s of silence.
     fn default() -> Self {
         Self::DEFAULT
     }
 }
 
 impl Settings {
-    /// Returns true if these settings allow the time slots of `config`. Unequal slots need `Joint` and a known
+    /// Returns true if a relay with these settings can fly a mission with the time slots of `config`.
+    ///
+    /// Equal slots are always allowed. Fitted slots (as long as each hop needs) need the method `Joint` and a known
     /// interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
@@ -209,7 +192,7 @@ impl Settings {
         !(ALTITUDE && config.fitted_gap > 0.0) || may_fit
     }
 
-    /// Default settings for `const` functions.
+    /// Default settings, as a constant for `const` functions.
     const DEFAULT: Self = Self {
         profile: None,
         hold_altitude: false,
@@ -233,10 +216,11 @@ impl Settings {
         sited: false,
     };
 
-    /// Returns settings for a UART of `baud` bit/s to each neighbour.
+    /// Returns settings for a UART of `baud` bit/s to each neighbour. Below 57 600 bit/s `hop_time` is longer than
+    /// the default.
     ///
-    /// `hop_time` includes 10 ms for computation and buffers. Below 57 600 bit/s it is longer than the default. Set a
-    /// longer time for a slower link, such as a USB adapter.
+    /// `hop_time` includes 10 ms for the computation and the buffers of the link. Set a longer time for a slower
+    /// link, such as a USB adapter.
     ///
     /// ```
     /// use uav_relay::{Method, Settings};
@@ -252,12 +236,13 @@ impl Settings {
         Self::DEFAULT.with_hop_time(alone, baud)
     }
 
-    /// Returns settings for one half-duplex radio channel of `baud` bit/s.
+    /// Returns settings for relays that share one half-duplex radio channel of `baud` bit/s. `load` is the number of
+    /// relays in range of each other, with the overhead of a frame.
     ///
-    /// `load` is the number of relays in range of each other, with the overhead of a frame. `probe_after` is 5 s, or
-    /// longer if 5 s would overload the channel ([`ChannelLoad::carried`]). `dead_after` is three times `probe_after`.
-    /// `hop_time` is [`ChannelLoad::hop_time`] with a latency of 10 ms, at least 30 ms. Set a longer `hop_time` for a
-    /// radio that buffers frames longer. All relays of a chain need the same settings.
+    /// `probe_after` is 5 s, or longer if the channel would be overloaded with 5 s ([`ChannelLoad::carried`]).
+    /// `dead_after` is three times `probe_after`. `hop_time` is the value of [`ChannelLoad::hop_time`] with a latency
+    /// of 10 ms, but at least 30 ms. Set a longer `hop_time` for a radio that buffers frames longer. All relays of a
+    /// chain need the same settings.
     ///
     /// ```
     /// use uav_relay::{ChannelLoad, Duration, Settings, Wiring};
@@ -282,7 +267,7 @@ impl Settings {
             .with_probe_after(probe_after)
     }
 
-    /// Returns the settings with another `probe_after`; `dead_after` is three times it.
+    /// Returns the settings with another `probe_after`, and with three times this value as `dead_after`.
     #[must_use]
     pub const fn with_probe_after(self, probe_after: Duration) -> Self {
         Self {
@@ -292,7 +277,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with at least the needed `hop_time`.
+    /// Returns the settings with at least the minimum `hop_time` for a channel of `baud` bit/s and `load`.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {
@@ -304,51 +289,43 @@ impl Settings {
     }
 }
 
-/// Parameter of [`Identity`] or [`Settings`] that is out of range.
+/// Error: a parameter of an [`Identity`] or of [`Settings`] is out of its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum SetupError {
-    /// `index` is not within 1 to the mission's number of relays.
+    /// The identity's `index` is not within 1 to the mission's number of relays.
     Index,
-    /// `profile.altitude_m` is not within 0.1 to 1e5, or `power_w` not within 1e-6 to 1e6.
+    /// `profile.altitude_m` is not within 0.1 to 1e5, or `profile.power_w` not within 1e-6 to 1e6.
     Profile,
-    /// The step of the fixed-step schedule is not above 0.
+    /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` cannot be used.
-    ///
-    /// In an interference field only [`Method::Align`] can. [`Method::Joint`] is for at most 100 relays. Or the crate
-    /// lacks the method's feature.
+    /// `method` cannot be used. Either the mission gives the interference as a distribution along x, and the method is
+    /// not [`Method::Align`]. Or the method is [`Method::Joint`], and the chain has more than 100 relays. Or the method
+    /// needs a feature that the crate was built without.
     Method,
-    /// Method Joint with `listen`, but the mission has `reverse`.
-    ///
-    /// With traffic in both directions this method needs a known interferer.
+    /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
+    /// traffic in both directions this method needs a known interferer.
     Reverse,
-    /// Time slots as long as hops need, without Joint or a known interferer.
-    ///
-    /// They are set by the mission's `fitted_gap`. With `listen`, the interferer counts as unknown.
+    /// The mission has fitted slots (`fitted_gap` above 0), but the method is not Joint. Or `listen` is set, or the
+    /// interferer is unknown.
     Fitted,
-    /// `method.explore_m` is not within 0 to 1e5, or its grid is too small.
-    ///
-    /// The search grid needs at least 2 columns and 2 rows.
+    /// `method.explore_m` is not within 0 to 1e5, or its search grid has fewer than 2 columns or rows.
     Adjust,
-    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `samples` out of range.
-    ///
-    /// `measure.samples` is 100 to 1 000 000. Or the crate lacks the feature `field`.
+    /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000. Or the crate was built
+    /// without the feature `field`.
     Measure,
-    /// A value of `listen` is out of range, or `listen` cannot be used.
-    ///
-    /// `every` and `half_life` are above 0, `relative_error` is 1e-3 to 1. Not in an interference field, nor without
-    /// the feature `sensing`.
+    /// `listen.every` or `listen.half_life` is zero, or `listen.relative_error` not within 1e-3 to 1. Or the mission
+    /// gives the interference as a distribution along x, or the crate was built without the feature `sensing`.
     Listen,
     /// `hop_time` is zero.
     HopTime,
     /// `auth.epoch` is zero.
     Epoch,
-    /// `probe_after` is zero, or `dead_after` is not longer.
+    /// `probe_after` is zero, or `dead_after` is not longer than `probe_after`.
     Silence,
-    /// `without_quorum.y_m` is not within -1e4 to 1e4, or `up_m` not within 0 to 1e4.
+    /// `without_quorum.y_m` is not within -1e4 to 1e4, or `without_quorum.up_m` not within 0 to 1e4.
     WithoutQuorum,
-    /// A number of `guard` is out of range, or the crate lacks the feature `guard`.
+    /// A number of `guard` is out of range, or the crate was built without the feature `guard`.
     Guard,
     /// `respacing` is longer than four times `dead_after`.
     Respacing,

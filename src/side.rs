@@ -1,30 +1,30 @@
 //! The two sides of a relay, and the order in which positions are computed along the chain.
 
-/// Order in which positions are computed; it determines the leader.
+/// Order in which the positions of a chain are computed; it determines the leader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// Relay 1 first: used with an interferer (Algorithm 1). A position follows from that of the sender toward Tx.
+    /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position is computed
+    /// from the position of its neighbour toward Tx, which sends to this relay.
     TowardRx,
-    /// Relay N first: used with an interference field (Algorithm 4). A position follows from that of the receiver
-    /// toward Rx.
+    /// Order from Rx to Tx, relay N first: used with an interference field (Algorithm 4). Each relay's position is
+    /// computed from the position of its neighbour toward Rx, which receives from this relay.
     TowardTx,
 }
 
-/// Direction from a relay: toward Tx or toward Rx.
-///
-/// Also the neighbour there, and the link to it.
+/// Side of a relay along the chain, toward Tx or toward Rx. Also used for the neighbour on that side, and for the link
+/// to this neighbour.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Direction toward Tx.
+    /// Side of a relay toward the transmitter Tx.
     Upstream,
-    /// Direction toward Rx.
+    /// Side of a relay toward the receiver Rx.
     Downstream,
 }
 
 impl Side {
-    /// Returns where messages in the direction `heading` are forwarded to.
+    /// Returns the side to which a relay forwards messages along the chain in the direction `heading`.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -32,7 +32,8 @@ impl Side {
         }
     }
 
-    /// Returns where messages come from; replies go there.
+    /// Returns the side from which messages along the chain in the direction `heading` arrive. Replies are sent to this
+    /// side.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

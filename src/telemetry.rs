@@ -8,54 +8,49 @@ use crate::time::Instant;
 use crate::wire::CANDIDATES;
 use crate::wire::message::{Coarse, Detail, Entry};
 
-/// State that a relay has reported to the ground station.
+/// State that a relay has reported to the ground station through the chain.
 ///
-/// In a pair, the first value is for the neighbour toward Tx, the second for that toward Rx.
+/// In a pair, the first value is for the neighbour toward Tx, the second for the neighbour toward Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Report {
-    /// Number of the relay in the mission, 1 (next to Tx) to N.
+    /// Number of the relay in the mission, from 1 (next to Tx) to N.
     pub relay: u16,
-    /// Time of this state, on the station's clock.
+    /// Time at which the relay was in this state, on the station's clock.
     pub at: Instant,
-    /// Position by the autopilot; `None` if it has none.
+    /// Position of the drone by its autopilot; `None` if the autopilot has no position.
     pub position: Option<Placement>,
-    /// Setpoint of the drone; `None` without one.
+    /// Setpoint of the drone; `None` if the drone has none.
     pub setpoint: Option<Placement>,
-    /// Position agreed by the chain; `None` before an agreement.
+    /// Position on which the chain has agreed for this relay; `None` before an agreement.
     pub agreed: Option<Placement>,
-    /// Phase of the agreement on positions.
+    /// Phase of the relay in the agreement on positions.
     pub phase: Phase,
-    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)).
-    ///
-    /// The lease permits the relay to rely on the agreed positions.
+    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)). The lease permits the relay to rely
+    /// on the agreed positions.
     pub holds_lease: bool,
-    /// Control state of the drone; `None` without an autopilot link.
+    /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
-    /// Reasons why the drone holds, one for each neighbour.
+    /// Reasons why the drone holds its position: because of the neighbour toward Tx, and toward Rx.
     pub hold_reasons: [Option<HoldReason>; 2],
-    /// Node numbers of the neighbours; `None` for none.
+    /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],
-    /// True for a neighbour that is not received now.
+    /// True for a neighbour that the relay does not receive now: toward Tx, and toward Rx.
     pub silent: [bool; 2],
-    /// True if another node of the same number was received recently.
-    ///
-    /// Within three times `dead_after`.
+    /// True if the relay has received another node with its own number within three times `dead_after`.
     pub is_duplicated: bool,
-    /// True while the autopilot flies to another target than the setpoint.
+    /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
     pub refuses_setpoint: bool,
-    /// Nearest node ignored for another mission; `None` for none.
+    /// Number of the nearest node that the relay ignores because of another mission; `None` for none.
     pub other_mission: Option<u16>,
-    /// Nearest node with another key; `None` for none.
-    ///
-    /// Its last handshakes were signed with another key.
+    /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
     pub other_key: Option<u16>,
-    /// Last measured interference, W, rounded to 0.8 %; `None` if none.
+    /// Interference last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
-    /// Version of the flown mission.
+    /// Version of the mission that the relay flies.
     pub version: u16,
 }
 
-/// Phases by their numbers in a report.
+/// Phases in the order of their numbers in a report.
 const PHASES: [Phase; 8] = [
     Phase::Idle,
     Phase::Planning,
@@ -67,7 +62,7 @@ const PHASES: [Phase; 8] = [
     Phase::NoQuorum,
 ];
 
-/// Control states by number in a report, from 1 to [`REFUSED`].
+/// Control states in the order of their numbers in a report, from 1. The last one is [`REFUSED`].
 const CONTROLS: [State; 6] = [
     State::Silent,
     State::Grounded,
@@ -77,10 +72,10 @@ const CONTROLS: [State; 6] = [
     State::Engaged,
 ];
 
-/// Controlled drone whose autopilot flies to another target.
+/// Control state of a drone that the relay controls, but whose autopilot flies to another target.
 pub(crate) const REFUSED: u16 = 6;
 
-/// Hold reasons by their numbers in a report, from 1.
+/// Hold reasons in the order of their numbers in a report, from 1.
 const HOLDS: [HoldReason; 7] = [
     HoldReason::Unheard,
     HoldReason::Order,
@@ -91,7 +86,9 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the ignored node, if any. `first` is 1 for another mission, 9 for another key.
+/// Returns the number of the node whose messages the relay of this entry ignores; `None` for none.
+///
+/// `first` is 1 if another mission is the reason, and 9 if another key is the reason.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),
@@ -100,13 +97,13 @@ fn refused(entry: &Entry, first: u16) -> Option<u16> {
     }
 }
 
-/// Returns element `number` of `all`, from 1.
+/// Returns the element of `all` with this number, counted from 1; `None` for 0 or a number too large.
 fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
     all.get(usize::from(number).checked_sub(1)?).copied()
 }
 
 impl Report {
-    /// Creates a report from an `entry` of time `at` and the last details.
+    /// Creates the report of one relay from its `entry` of time `at` and its last details.
     ///
     /// Not part of the public interface: tests and tools of this workspace decode captures with it.
     #[doc(hidden)]

@@ -4,7 +4,7 @@
 
 use core::ops::Add;
 
-/// A point in time, in microseconds since the caller's epoch.
+/// A point in time, in microseconds since an epoch of the caller's choosing.
 ///
 /// Arithmetic saturates instead of wrapping.
 ///
@@ -95,32 +95,35 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Largest backward step that counts as calls in wrong order.
+/// Maximum backward step of the caller's time that counts as calls in the wrong order. A larger step counts as a change
+/// of the caller's clock.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum advance per call; a wrong reading then stops no timer.
+/// Maximum advance of internal time in one call, about 140 years. Without this limit, one wrong reading of the clock
+/// could take internal time to its maximum, and no timer would expire any more.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
-/// Clock of internal time, which never runs backward.
+/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time can step in
+/// either direction.
 ///
 /// | caller's time | internal time |
 /// | --- | --- |
 /// | up to 140 years after the latest | advances as much |
 /// | later than that | advances by 140 years |
 /// | up to 100 ms before the latest | stands still until the caller's time has caught up |
-/// | earlier than that | goes on from the latest, in step with the caller's time |
+/// | earlier than that | goes on from the latest, in step with the caller's time from now on |
 ///
-/// A backward step extends a lease at most by the time between two calls.
+/// Timers continue after a backward step. The step extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
-    /// Latest time of the caller's clock.
+    /// Latest time of the caller's clock to which this clock has advanced.
     latest: Instant,
-    /// Internal time at `latest`.
+    /// Internal time at which the caller's clock showed `latest`. The internal time never runs backward.
     internal: Instant,
 }
 
 impl MonotonicClock {
-    /// Creates a clock equal to the caller's until that jumps.
+    /// Creates a clock whose internal time equals the caller's time until the caller's clock jumps.
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             latest: now,
@@ -128,7 +131,7 @@ impl MonotonicClock {
         }
     }
 
-    /// Advances to the caller's time; returns the internal time.
+    /// Advances the clock to the caller's time, and returns the internal time, which never runs back.
     pub(crate) fn advance(&mut self, now: Instant) -> Instant {
         if now >= self.latest {
             self.internal = self.internal + now.since(self.latest).min(LONGEST);
@@ -139,7 +142,7 @@ impl MonotonicClock {
         self.internal
     }
 
-    /// Returns the internal time of the last [`advance`](Self::advance).
+    /// Returns the internal time as of the last call of [`advance`](Self::advance).
     pub(crate) const fn now(&self) -> Instant {
         self.internal
     }
@@ -155,13 +158,14 @@ impl MonotonicClock {
     }
 }
 
-/// Returns `to + (at - from)`.
+/// Converts `at` from one clock to another: returns `to` + (`at` - `from`). The first clock shows `from` when the
+/// second shows `to`.
 fn shifted(at: Instant, from: Instant, to: Instant) -> Instant {
     let back = from.since(at).as_micros();
     Instant::from_micros((to + at.since(from)).as_micros().saturating_sub(back))
 }
 
-/// Pseudorandom numbers for timing and sessions. Xorshift (Marsaglia 2003, 13-17-5).
+/// Generator of pseudorandom numbers for timing and session numbers. It is xorshift (Marsaglia 2003, 13-17-5).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Jitter(u32);
 
@@ -187,7 +191,8 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` plus up to an eighth, at random.
+    /// Returns `span` plus a random time of up to an eighth of `span`. Relays on a shared channel then do not
+    /// transmit at the same time again and again.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.
@@ -196,7 +201,7 @@ impl Jitter {
         Duration::from_micros(span.as_micros().saturating_add(random))
     }
 
-    /// Returns the next pseudorandom number, 1 to 65535.
+    /// Returns the next pseudorandom number, from 1 to 65535.
     pub(crate) const fn number(&mut self) -> u16 {
         let [_, a, b, _] = self.draw().to_le_bytes();
         match u16::from_le_bytes([a, b]) {

@@ -2,21 +2,22 @@
 
 use crate::mission::MAX_RELAYS;
 
-/// Identifier of a view, an agreement on the chain's members.
+/// Identifier of a view, which is an agreement on the members of the chain.
 ///
-/// It has a number and the proposing node, so no two nodes propose the same. Ordered by number, then by proposer.
+/// It consists of a number and of the node that proposed the view, so that no two nodes propose the same view. Views
+/// are ordered by number, then by proposer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
 
-/// Number of bits for the proposer: 1000 relays.
+/// Number of bits of a view identifier that hold the proposing node's number, enough for 1000 relays.
 const NODE: u32 = 10;
 
 impl ViewId {
-    /// Initial view: the configured chain, without a proposer.
+    /// Initial view: the chain as configured in the mission, without a proposer.
     pub const LOADED: Self = Self(0);
 
-    /// Decodes an identifier: the proposer in the low ten bits, the number above.
+    /// Decodes a view identifier: the proposer in the low ten bits, the number above.
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
@@ -36,12 +37,12 @@ impl ViewId {
         (self.0 & ((1 << NODE) - 1)) as u16
     }
 
-    /// Returns true if a node can have proposed this view.
+    /// Returns true if a node can have proposed this view: a valid proposer, and not the initial view.
     pub(crate) const fn is_proposed(self) -> bool {
         self.number() > 0 && 1 <= self.proposer() && self.proposer() <= MAX_RELAYS
     }
 
-    /// Returns the next view by `node`; `None` after four million.
+    /// Returns the view with the next number, proposed by `node`, 1 to 1000. `None` after four million views.
     pub(crate) const fn next_by(self, node: u16) -> Option<Self> {
         let number = self.number() + 1;
         if number >> (32 - NODE) == 0 {
@@ -51,7 +52,8 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, at most `most` above this number. A received view cannot raise the number further.
+    /// Returns `view` with its number limited to this view's number plus `most`. This bounds the step by which a
+    /// received view can raise the known number.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -61,20 +63,21 @@ impl ViewId {
         }
     }
 
-    /// Returns a 16-bit value, added to the mission's digest. It differs by proposer.
+    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. It differs for views with
+    /// the same number and different proposers, and for thousands of consecutive views.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
     }
 }
 
-/// View: agreed members of the chain.
+/// View: agreed membership of the chain, with its identifier and its number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct View {
-    /// Identifier of the view.
+    /// Identifier of the view, an agreed set of members of the chain.
     pub id: ViewId,
-    /// Number of members, 1 to 1000.
+    /// Number of relays that are members of the view, 1 to 1000.
     pub relays: u16,
 }
 

@@ -1,18 +1,18 @@
 //! Estimator of Upsilon at one position from measured interference powers.
 //!
-//! u = I / `I_max` has a Beta distribution, as in the paper, whose shapes follow from the mean m and the variance v of
-//! the samples:
+//! u = I / `I_max` has a Beta distribution, as in the paper, whose shapes follow from the mean m and the variance v of the
+//! samples:
 //!
 //! ```text
 //! w = m (1 - m) / v - 1,    alpha = m w,    beta = (1 - m) w,    Upsilon = (1 + beta / (alpha - 1)) / I_max
 //! ```
 //!
-//! We use moments and not maximum likelihood, because the latter needs two logarithms a sample and digamma functions at
-//! the end. From alpha = 3 on it is at most 8 % more accurate; at alpha = 1.5 it would be 6 to 28 %. The samples' mean
-//! of 1 / I would need no fit, but has an infinite variance for alpha <= 2.
+//! We use moments and not maximum likelihood, because the latter needs two logarithms a sample and digamma functions at the end.
+//! From alpha = 3 on it is at most 8 % more accurate; at alpha = 1.5 it would be 6 to 28 %. The samples' mean of 1 / I would need
+//! no fit, but has an infinite variance for alpha <= 2.
 //!
-//! The standard error uses the delta method: with z1 the error of m in units of sqrt(v) and z2 that of v in units of v,
-//! n Var(z1) = 1, n Cov = skewness and n Var(z2) = 2 + excess kurtosis, those of the fitted Beta distribution, and
+//! The standard error uses the delta method: with z1 the error of m in units of sqrt(v) and z2 that of v in units of v, n Var(z1)
+//! = 1, n Cov = skewness and n Var(z2) = 2 + excess kurtosis, those of the fitted Beta distribution, and
 //!
 //! ```text
 //! d alpha / d z1 = sqrt(v) w + m (1 - 2m) / sqrt(v)        d alpha / d z2 = -m (w + 1)
@@ -20,73 +20,72 @@
 //! d ln(beta / (alpha - 1)) / d z2 = (w + 1) / (w (alpha - 1))
 //! ```
 //!
-//! Upsilon grows without limit as alpha falls to 1, which a derivative does not show. So the error is divided by 1 - 2
-//! s, with s the standard error of alpha over alpha - 1. Two standard errors above the estimate is then the Upsilon of
-//! an alpha two of *its* standard errors lower, and if that alpha is 1 there is no estimate.
+//! Upsilon grows without limit as alpha falls to 1, which a derivative does not show. So the error is divided by 1 - 2 s, with s
+//! the standard error of alpha over alpha - 1. Two standard errors above the estimate is then the Upsilon of an alpha two of
+//! *its* standard errors lower, and if that alpha is 1 there is no estimate.
 //!
-//! The sums are integers, so no sample is too small for its sum, and the variance does not cancel. The accuracy is
-//! asserted in `host-tests/tests/field/estimation.rs`.
+//! The sums are integers, so no sample is too small for its sum, and the variance does not cancel. The accuracy is asserted in
+//! `host-tests/tests/field/estimation.rs`.
 
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Value 1 of a sample in fixed point: sums do not overflow.
+/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. Sums of samples and of squares do not overflow
+/// in this format.
 const ONE: f32 = 2_147_483_648.0;
 
-/// Number of fractional bits of a sample.
+/// Number of fractional bits of the fixed-point numbers in which interference samples are summed.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of the samples for an estimate; less is rounding.
+/// Smallest mean of the samples I / `I_max` for which an estimate is made. With a smaller mean, rounding would
+/// falsify the estimate.
 const LEAST_MEAN: f32 = 1e-6;
 
-/// Estimator of Upsilon, the mean inverse interference power, at one position.
+/// Estimator of Upsilon, the mean inverse interference power, at one position. It stores sums, not samples.
 ///
-/// It stores sums, not samples: 40 bytes on a Cortex-M4F. Samples must be independent. If they are taken faster than
-/// the interference changes, the true error is larger than stated.
+/// 40 bytes on a Cortex-M4F. Samples must be independent: if they are taken faster than the interference changes, the true error is larger
+/// than the stated standard error.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimator {
-    /// Sum of the squared samples, in units of 2^-62.
+    /// Sum of the squares of the accepted samples I / `I_max`, in units of 2^-62.
     squares: u128,
-    /// Sum of the samples, in units of 2^-31.
+    /// Sum of the accepted samples I / `I_max`, in units of 2^-31.
     sum: u64,
-    /// Maximum power `I_max`, W; 0 if [`Estimator::new`] got a wrong one.
+    /// Maximum interference power `I_max`, W; 0 if the argument of [`Estimator::new`] was out of range.
     i_max_w: f32,
     accepted: u32,
     rejected: u32,
 }
 
-/// Estimate of Upsilon = E[1/I] by an [`Estimator`].
-///
-/// Every number is finite.
+/// Estimate of Upsilon = E[1/I], the mean inverse interference power, by an [`Estimator`]. Every number is finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
-    /// First shape of the fitted Beta distribution, above 1.
+    /// First shape parameter of the Beta distribution fitted to I / `I_max`, above 1.
     pub alpha: f32,
-    /// Second shape of the fitted Beta distribution, above 0.
+    /// Second shape parameter of the Beta distribution fitted to I / `I_max`, above 0.
     pub beta: f32,
-    /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32.
-    ///
-    /// It is valid for a point of a [`Field`](super::Field).
+    /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32. The value is valid for a point of a [`Field`](super::Field).
     pub upsilon_per_w: f32,
-    /// Standard error of `upsilon_per_w`, 1/W, above 0.
+    /// Standard error of `upsilon_per_w`, 1/W, above 0. The true Upsilon is within two standard errors of the
+    /// estimate with a probability of about 95 %.
     ///
-    /// The true Upsilon is within two of them with a probability of about 95 %, if the interference has a Beta
-    /// distribution. It covers the limited number of samples only.
+    /// This assumes that the interference has a Beta distribution. The standard error covers the limited number of
+    /// samples only: with another distribution the estimate can be wrong by more.
     pub standard_error_per_w: f32,
-    /// Number of accepted samples.
+    /// Number of accepted samples on which the estimate is based.
     pub samples: u32,
 }
 
 impl Estimator {
     /// Minimum number of accepted samples for an estimate.
     ///
-    /// So few can still be bad: with 100 samples and a true alpha below 1.5, most estimates exist only because alpha is
-    /// overestimated. The estimated Upsilon is then too low.
+    /// An estimate from so few samples can still be bad. With 100 samples and a true alpha below 1.5, most estimates
+    /// exist only because alpha is overestimated by chance. The estimated Upsilon is then too low.
     pub const MIN_SAMPLES: u32 = 100;
 
-    /// Creates an estimator; `i_max_w` is the maximum power, W: 1e-30 to 1e6.
+    /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.
     ///
     /// With any other `i_max_w` it rejects every sample and never gives an estimate.
     pub const fn new(i_max_w: f32) -> Self {
@@ -100,11 +99,11 @@ impl Estimator {
         }
     }
 
-    /// Adds a measured interference power, W, above 0 and at most `I_max`.
+    /// Adds a measured interference power, W, above 0 and at most `I_max`. Other values are counted as rejected.
     ///
-    /// Rejected and counted are NaN, infinities, negative numbers, powers above `I_max`, and 0. A 0 means less than
-    /// measurable; leaving it out only makes Upsilon smaller. After 2^32 - 1 samples all others are ignored. At most
-    /// 100 instructions on a Cortex-M4F; 61 were counted.
+    /// Rejected are NaN, infinities, negative numbers, powers above `I_max`, and 0. A 0 means less than the receiver can measure,
+    /// has probability 0 in a Beta distribution with alpha > 1, and its omission only makes Upsilon smaller. After 2^32 - 1
+    /// samples all others are ignored and not counted. At most 100 instructions on a Cortex-M4F; 61 were counted.
     pub fn push(&mut self, power_w: f32) {
         if self.accepted == u32::MAX {
             return;
@@ -119,7 +118,7 @@ impl Estimator {
         self.squares = self.squares.saturating_add(u128::from(units * units));
     }
 
-    /// Clears samples and counts, for example after a move; `I_max` stays.
+    /// Clears all samples and counts, for example after the relay has moved; `I_max` stays.
     pub const fn clear(&mut self) {
         *self = Self::new(self.i_max_w);
     }
@@ -129,21 +128,20 @@ impl Estimator {
         self.accepted
     }
 
-    /// Number of rejected samples.
-    ///
-    /// Many mean that `I_max` is too small, or that the receiver measures nothing.
+    /// Number of rejected samples. A large number means that `I_max` is too small, or that the receiver measures
+    /// nothing.
     pub const fn rejected(&self) -> u32 {
         self.rejected
     }
 
     /// Returns the estimate of the samples so far.
     ///
-    /// `None` with fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES), or if all samples are equal. Also if alpha minus two
-    /// of its standard errors is not above 1: E[1/I] could be infinite. Also if the mean is below 1e-6 `I_max`, or
-    /// Upsilon above 1e32. Constant work, at most 1000 instructions on a Cortex-M4F; 408 were counted.
+    /// `None` if there are fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES), if all samples are equal, if alpha minus two of its standard
+    /// errors is not above 1 (E[1/I] could then be infinite), if the mean is below 1e-6 `I_max`, or if Upsilon is above 1e32. Constant
+    /// work, at most 1000 instructions on a Cortex-M4F; 408 were counted.
     ///
-    /// With 10 000 samples Upsilon is within 5 % in 99 of 100 cases for alpha from 3 to 20 and beta from 0.5 to 20, as
-    /// asserted by `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_covers_the_error` in
+    /// With 10 000 samples Upsilon is within 5 % in 99 of 100 cases for alpha from 3 to 20 and beta from 0.5 to 20, as asserted
+    /// by `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_covers_the_error` in
     /// `host-tests/tests/field/estimation.rs`.
     pub fn estimate(&self) -> Option<Estimate> {
         let fit = Fit::of(self)?;
@@ -184,15 +182,15 @@ impl Estimator {
     }
 }
 
-/// Beta distribution with the samples' mean and variance.
+/// Beta distribution with the mean and the variance of the samples.
 struct Fit {
-    /// Mean m of the samples I / `I_max`.
+    /// Mean m of the accepted samples I / `I_max`.
     m: f32,
-    /// Difference 1 - m, without loss of digits.
+    /// Difference 1 - m, where m is the mean of the samples; computed without loss of digits.
     rest: f32,
-    /// Standard deviation of the samples I / `I_max`.
+    /// Standard deviation of the accepted samples I / `I_max`.
     s: f32,
-    /// Sum alpha + beta of the shapes.
+    /// Sum alpha + beta of the two shape parameters of the fitted Beta distribution.
     w: f32,
 }
 

@@ -1,41 +1,39 @@
 //! Interference field: interference that is known as a distribution along x, not by its source.
 //!
-//! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times
-//! Upsilon(x) = E[1 / I(x)], in 1/W; placement needs nothing else of the distribution. A [`Field`] is a table of
-//! Upsilon along x. If I / `I_max` has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; from
-//! measurements, [`estimate::Estimator`] fits one.
+//! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times Upsilon(x) = E[1
+//! / I(x)], in 1/W; placement needs nothing else of the distribution. A [`Field`] is a table of Upsilon along x. If I / `I_max`
+//! has a Beta distribution there is a closed form, [`FieldPoint::beta_upsilon`]; from measurements, [`estimate::Estimator`] fits one.
 
 pub mod estimate;
 mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed Upsilon = E[1/I], 1/W: more than any receiver measures.
+/// Allowed range of Upsilon = E[1/I], 1/W. It corresponds to an interference I of 1e9 W down to 1e-32 W, more than any
+/// receiver measures.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
-/// Point of a [`Field`]: an x, and Upsilon = E[1/I] there.
-///
-/// Upsilon is the mean inverse interference power.
+/// Point of a [`Field`]: an x, and Upsilon = E[1/I] at this x. Upsilon is the mean of the inverse interference power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FieldPoint {
     /// Position along the line from Tx (0) to Rx (D), m: -1e7 to 1e7.
     pub x_m: f32,
-    /// Upsilon = E[1/I] here, 1/W: 1e-9 to 1e32.
+    /// Upsilon = E[1/I] at this x, 1/W: 1e-9 to 1e32.
     pub upsilon_per_w: f32,
 }
 
-/// Reason why [`Field::try_new`] rejects a table.
+/// Reason why [`Field::try_new`] rejects a table of points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum FieldError {
     /// The table has no point, or more than [`Field::MAX_POINTS`].
     Points,
-    /// `x_m` is not within -1e7 to 1e7.
+    /// The x of a point of the interference field, `x_m`, is not within -1e7 to 1e7 m.
     Place,
-    /// `x_m` is not larger than that of the previous point.
+    /// The `x_m` of a point is not larger than the `x_m` of the previous point.
     Order,
-    /// `upsilon_per_w` is not within 1e-9 to 1e32.
+    /// The `upsilon_per_w` of a point is not within 1e-9 to 1e32.
     Upsilon,
 }
 
@@ -46,9 +44,8 @@ error_texts!(FieldError {
     Upsilon => "upsilon_per_w (mean of 1 / interference power, in 1/W) must be within 1e-9 to 1e32",
 });
 
-/// Interference field: a checked table of Upsilon = E[1/I] along x.
-///
-/// Upsilon is linear between two points, and constant beyond the ends.
+/// Interference field: a checked table of Upsilon = E[1/I] along x. Upsilon is linear between two points, and constant
+/// beyond the ends of the table.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Field {
@@ -58,15 +55,17 @@ pub struct Field {
 }
 
 impl Field {
-    /// Maximum number of points of a field.
+    /// Maximum number of points of an interference field.
     pub const MAX_POINTS: usize = 1024;
 
-    /// Creates a field from a table, after checking every point.
+    /// Creates an interference field from a table, after checking every point.
     ///
-    /// In a constant use [`Field::new`], which fails the build on an error. Work: a few comparisons for each point.
+    /// Usable in a constant, where [`Field::new`] turns an error into a failed build.
+    ///
+    /// Work: a few comparisons for each point.
     ///
     /// # Errors
-    /// [`FieldError`] names the first value outside its range.
+    /// [`FieldError`] names the first value that is outside its range.
     pub const fn try_new(points: &'static [FieldPoint]) -> Result<Self, FieldError> {
         if points.is_empty() || points.len() > Self::MAX_POINTS {
             return Err(FieldError::Points);
@@ -128,37 +127,38 @@ impl Field {
         }
     }
 
-    /// Returns the points of the table.
+    /// Returns the points of the interference field, a table of Upsilon = E[1/I] along x.
     pub const fn points(&self) -> &'static [FieldPoint] {
         self.points
     }
 
-    /// Returns the smallest Upsilon = E[1/I], 1/W: the worst interference.
+    /// Returns the smallest Upsilon = E[1/I] of the table, 1/W: the worst interference.
     pub const fn smallest(&self) -> f32 {
         self.smallest
     }
 
-    /// Returns the largest Upsilon = E[1/I], 1/W: the weakest interference.
+    /// Returns the largest Upsilon = E[1/I] of the table, 1/W: the weakest interference.
     pub const fn largest(&self) -> f32 {
         self.largest
     }
 
-    /// Returns true if Upsilon is the same everywhere (i.i.d. interference).
+    /// Returns true if Upsilon = E[1/I] is the same everywhere: the paper's i.i.d. interference.
     pub const fn is_constant(&self) -> bool {
         !(self.smallest < self.largest)
     }
 
-    /// Returns Upsilon = E[1/I] at `x_m`, 1/W, interpolated linearly.
+    /// Returns Upsilon = E[1/I] at `x_m`, 1/W, interpolated linearly with a relative error below 4e-7.
     ///
-    /// The relative error is below 4e-7. Every `x_m` is valid: beyond an end its point counts, for NaN the first point.
-    /// The result is within the range of the two points around it. Work: at most eleven comparisons and three
-    /// divisions. Asserted by `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in
-    /// `host-tests/tests/field/table.rs`.
+    /// Every `x_m` is valid: beyond an end point the result is the Upsilon of this end point, and for NaN the Upsilon
+    /// of the first point. The result is never outside the range of the two points around it. Work: at most eleven
+    /// comparisons of a binary search, three divisions. The accuracy is asserted by
+    /// `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in `host-tests/tests/field/table.rs`.
     pub const fn upsilon(&self, x_m: f32) -> f32 {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// Returns the points around `x_m`; one at a point or beyond.
+    /// Returns the two points around `x_m`. If `x_m` is at a point or beyond the table, the first result is this point
+    /// or the end point, and the second is `None`.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {
@@ -205,11 +205,12 @@ pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
 impl FieldPoint {
     /// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution.
     ///
-    /// It is `(alpha + beta - 1) / ((alpha - 1) i_max_w)`, with the shapes `alpha` and `beta`, and the maximum power
-    /// `i_max_w`, W. The paper's I is relative to `I_max`. `None` unless `alpha > 1` (otherwise E[1/I] is infinite),
-    /// `beta > 0`, `i_max_w > 0`, and all three and the result are finite. It uses f64: near alpha = 1 an f32 is too
-    /// coarse. It is for constants, without run time. Accuracy:
-    /// `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
+    /// It is (alpha + beta - 1) / ((alpha - 1) `i_max_w`), with the shape parameters `alpha` and `beta`, and the
+    /// maximum power `i_max_w` in W. The paper's formula has no `I_max`, because its I is relative to `I_max`. `None`
+    /// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are
+    /// finite. The computation uses f64, because near alpha = 1 an f32 of alpha would be too coarse. It is intended for
+    /// constants, where it takes no run time. Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in
+    /// `host-tests/tests/field/closed_forms.rs`.
     pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
         let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
         if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {
@@ -223,9 +224,10 @@ impl FieldPoint {
         }
     }
 
-    /// Returns the point at `x_m`, m, if I / `i_max_w` has a Beta distribution there.
+    /// Returns the point of a field at `x_m`, m, if I / `i_max_w` has a Beta distribution there. I is the interference
+    /// power.
     ///
-    /// `None` if [`beta_upsilon`](Self::beta_upsilon) is `None`. Constant work.
+    /// `None` if [`beta_upsilon`](Self::beta_upsilon) is `None` for the same shapes and `i_max_w`. Constant work.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a field refuses what does not fit"

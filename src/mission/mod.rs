@@ -1,7 +1,7 @@
 //! Mission: everything that the relays must know alike before flight, validated once.
 //!
-//! [`MissionConfig`] has the parameters as plain numbers, and [`MissionError`] names a rejected one; a [`Mission`] has
-//! checked parameters, and quantities derived from them.
+//! [`MissionConfig`] has the parameters as plain numbers, and [`MissionError`] names a rejected one; a [`Mission`] has checked parameters, and
+//! quantities derived from them.
 
 use crate::channel::Channel;
 use crate::features::{ALTITUDE, FIELD, NOISE, REVERSE};
@@ -14,73 +14,63 @@ use crate::side::Heading;
 #[cfg(test)]
 pub(crate) mod tests;
 
-/// Maximum number of relays of a mission.
+/// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x, as a fraction of the Tx-Rx distance. It is at least two steps of an f32.
+/// Smallest step in x between two relays, as a fraction of the distance from Tx to Rx. It is at least two steps of an
+/// f32 even near Rx, so that no two positions are equal.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
-/// Maximum rounding error of a step, as a fraction of the Tx-Rx distance.
+/// Maximum rounding error of a step in x, as a fraction of the distance from Tx to Rx.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 /// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
 ///
-/// x runs along the ground from Tx (0) to Rx (`distance_m`), y to its right seen from above. Altitude is the height
-/// above the ground.
+/// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to its right as seen from above,
+/// altitude is height above the ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionConfig {
     /// Number of relays N, 1 to [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
     pub relays: u16,
-    /// Distance D from Tx to Rx, m: 1 to 1e6.
+    /// Distance D from transmitter to receiver, m: 1 to 1e6.
     pub distance_m: f32,
     /// Minimum distance between two relays, m: 0 to 1e5.
     pub min_separation_m: f32,
-    /// Transmit power of Tx, W: 1e-6 to 1e6.
+    /// Transmit power of the ground transmitter, W: 1e-6 to 1e6.
     pub tx_power_w: f32,
-    /// Altitude and power of every relay that has no own profile.
+    /// Altitude and power of every relay without a profile of its own.
     pub common: Profile,
-    /// Range of altitudes, m, for methods that choose altitudes.
-    ///
-    /// Within 0.1 to 1e5; includes `common.altitude_m`.
+    /// Range of altitudes, m, for methods that choose altitudes. Within 0.1 to 1e5; includes `common.altitude_m`.
     pub band: Band,
-    /// Range of lateral offsets y, m, for the joint method.
-    ///
-    /// Within -1e5 to 1e5; includes 0.
+    /// Range of lateral offsets y, m, for the joint method: within -1e5 to 1e5; includes 0.
     pub lateral: Band,
-    /// Path loss between drones, drone to ground, and interferer to Rx.
+    /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops.
-    ///
-    /// One transmitter at a known or unknown position, or a distribution along x (a field).
+    /// Interference on the hops: one transmitter, at a known or unknown position, or a field. A field is a distribution
+    /// along x.
     pub interference: Interference,
-    /// Noise power at every receiver's input, W: 0 to 1.
-    ///
-    /// At most 1e12 times the interferer's power received at 1 m. 0 is the paper's receiver. Above 0 every SIR is the
-    /// SINR.
+    /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
+    /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
-    /// SIR needed from Rx to Tx, divided by that from Tx to Rx: r, 0 to 1.
+    /// SIR that a hop needs from Rx to Tx, divided by the SIR that it needs from Tx to Rx: r, 0 to 1.
     ///
-    /// 0 means one direction only, as in the paper. Above 0 the lower of two SIRs counts: the forward SIR, and the
-    /// backward SIR / r. An unknown interferer counts as r = 0.
+    /// 0 means one direction only, as in the paper. Above 0, the lower of two SIRs counts once the interference is
+    /// known: the forward SIR, and the backward SIR divided by r.
     pub reverse: f32,
-    /// Transmit power of Rx when it sends toward Tx, W: 1e-6 to 1e6.
-    ///
-    /// Without effect if `reverse` is 0.
+    /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
+    /// 0.
     pub rx_power_w: f32,
-    /// SNR gap, linear: 1 to 1000; 0 for equal time slots.
-    ///
-    /// With a gap, each time slot is as long as its hop needs. The joint method then maximises the data rate. A hop's
-    /// spectral efficiency is log2(1 + SINR / gap).
+    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, each time slot is as long as its
+    /// hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is
+    /// log2(1 + SINR / gap).
     pub fitted_gap: f32,
-    /// Relative tolerance of the SIR: 1e-6 to 0.1.
-    ///
-    /// A chain this close to the best SIR is accepted.
+    /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,
 }
 
 impl MissionConfig {
-    /// Checks that the relays fit into the distance.
+    /// Checks the number of relays, and that they fit into the distance with their minimum separation.
     pub(super) const fn room(&self) -> Result<(), MissionError> {
         if self.relays < 1 || self.relays > MAX_RELAYS {
             return Err(MissionError::Relays);
@@ -92,7 +82,7 @@ impl MissionConfig {
         Ok(())
     }
 
-    /// Checks `reverse`, `rx_power_w` and `fitted_gap`.
+    /// Checks the parameters of the data link: `reverse`, `rx_power_w` and `fitted_gap`.
     const fn data_link(&self) -> Result<(), MissionError> {
         if !within(self.reverse, 0.0, 1.0) {
             return Err(MissionError::Reverse);
@@ -115,7 +105,7 @@ impl MissionConfig {
     }
 }
 
-/// Rejected parameter of a [`MissionConfig`], and its range.
+/// Parameter of a [`MissionConfig`] that is rejected, and its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum MissionError {
@@ -125,13 +115,12 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays with `min_separation_m` between them need more than `distance_m`.
-    ///
-    /// This includes a rounding margin of 5e-7 `distance_m` per relay.
+    /// The relays with `min_separation_m` between them need more than `distance_m`. This includes a rounding margin
+    /// of 5e-7 `distance_m` per relay.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
-    /// `common.altitude_m` is not within 0.1 to 1e5, or `power_w` not within 1e-6 to 1e6.
+    /// `common.altitude_m` is not within 0.1 to 1e5, or `common.power_w` not within 1e-6 to 1e6.
     Common,
     /// `band` is not in order, not within 0.1 to 1e5, or leaves out `common.altitude_m`.
     Band,
@@ -141,23 +130,21 @@ pub enum MissionError {
     InterfererPower,
     /// `interferer.x_m` or `interferer.y_m` is not within -1e7 to 1e7.
     InterfererPlace,
-    /// `noise_w` is not within 0 to 1, or too far above the interference.
-    ///
-    /// The limit is 1e12 times the interferer's power received at 1 m.
+    /// `noise_w` is not within 0 to 1, or above 1e12 times the interferer's power received at 1 m.
     Noise,
-    /// `noise_w` is above 0, but the crate lacks its feature `noise`.
+    /// `noise_w` is above 0, and the crate was built without its feature `noise`.
     NoiseFeature,
-    /// The interference is a field, but the crate lacks its feature `field`.
+    /// The interference is a field (a distribution along x), but the crate was built without `field`.
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
-    /// `reverse` is above 0, but the crate lacks its feature `reverse`.
+    /// `reverse` is above 0, and the crate was built without its feature `reverse`.
     ReverseFeature,
     /// `rx_power_w` is not within 1e-6 to 1e6.
     RxPower,
     /// `fitted_gap` is neither 0 nor within 1 to 1000.
     FittedGap,
-    /// `fitted_gap` is not 0, but the crate lacks its feature `altitude`.
+    /// `fitted_gap` is not 0, and the crate was built without its feature `altitude`.
     FittedFeature,
     /// `tolerance` is not within 1e-6 to 0.1.
     Tolerance,
@@ -185,17 +172,15 @@ error_texts!(MissionError {
     Tolerance => "tolerance must be within 1e-6 to 0.1",
 });
 
-/// Interferer on the ground (the paper's MSI), for example a jammer.
+/// Interferer on the ground (the paper's MSI): a jammer, a base station, a licensed user.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interferer {
     /// Transmit power of the interferer, W.
     pub power_w: f32,
-    /// Position along the line from Tx (0) to Rx (D), m.
-    ///
-    /// May be before Tx or beyond Rx.
+    /// Position of the interferer along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
     pub x_m: f32,
-    /// Lateral offset, m: positive to the right, seen from Tx toward Rx.
+    /// Lateral offset of the interferer, m: positive to the right of the line Tx to Rx, else negative.
     pub y_m: f32,
 }
 
@@ -208,27 +193,26 @@ impl Interferer {
         within(self.x_m, -1e7, 1e7) && within(self.y_m, -1e7, 1e7)
     }
 
-    /// Returns true if power and position are within their ranges.
+    /// Returns true if the interferer's power and position are within their allowed ranges.
     pub const fn is_valid(&self) -> bool {
         self.is_powered() && self.is_placed()
     }
 }
 
-/// Interference on the hops of a mission.
+/// Kind of interference that degrades the hops of a mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Interference {
-    /// Transmitter at a known position.
+    /// Single interfering transmitter at a known position.
     Source(Interferer),
-    /// Distribution of the interference along x.
+    /// Interference field: only the distribution of the interference along x is known.
     Field(Field),
-    /// Transmitter at an unknown position.
-    ///
-    /// Relays spread evenly until they know it ([`crate::Settings::listen`]).
+    /// Single interfering transmitter at an unknown position. Relays spread evenly until they know it
+    /// ([`crate::Settings::listen`]).
     Unknown,
 }
 
-/// Range of altitudes or lateral offsets, m.
+/// Range of altitudes or of lateral offsets that a relay may choose from.
 ///
 /// ```
 /// use uav_relay::Band;
@@ -240,17 +224,17 @@ pub enum Interference {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Band {
-    /// Lower limit, m.
+    /// Smallest allowed altitude, or smallest allowed lateral offset, of the relays, m.
     pub least_m: f32,
-    /// Upper limit, m; at least `least_m`.
+    /// Upper limit of the altitudes or lateral offsets, m: at least `least_m`.
     pub most_m: f32,
 }
 
 impl Band {
-    /// Lateral range that allows only y = 0, as in the paper.
+    /// Lateral range that allows y = 0 only. As in the paper, relays stay in the vertical plane through Tx and Rx.
     pub const NONE: Self = Self::at(0.0);
 
-    /// Returns the range with the single value `at_m`, m.
+    /// Returns the range that contains only the value `at_m`, m.
     pub const fn at(at_m: f32) -> Self {
         Self {
             least_m: at_m,
@@ -258,7 +242,7 @@ impl Band {
         }
     }
 
-    /// Returns the value in this range nearest to `at_m`, m.
+    /// Returns the value in this range that is nearest to `at_m`, m.
     pub const fn nearest(self, at_m: f32) -> f32 {
         if at_m >= self.most_m {
             self.most_m
@@ -269,44 +253,44 @@ impl Band {
         }
     }
 
-    /// Width of this range, m.
+    /// Width of this range of altitudes or lateral offsets, m: upper limit minus lower limit.
     pub const fn span_m(self) -> f32 {
         self.most_m - self.least_m
     }
 
-    /// Returns true if this range contains a single value.
+    /// Returns true if this range contains a single value, so that the relay has no choice.
     pub const fn is_single(self) -> bool {
         !(self.least_m < self.most_m)
     }
 
-    /// Returns true for valid altitudes: ordered, 0.1 to 1e5 m.
+    /// Returns true if this is a valid range of altitudes: limits in order and within 0.1 to 1e5 m.
     pub(super) const fn is_of_altitudes(self) -> bool {
         within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
     }
 
-    /// Returns true for a valid lateral range: ordered, including 0, -1e5 to 1e5 m.
+    /// Returns true if this is a valid lateral range: limits in order, within -1e5 to 1e5 m, including 0.
     pub(super) const fn is_room_beside(self) -> bool {
         within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
     }
 }
 
-/// Altitude and transmit power of one relay.
+/// Altitude and transmit power that the mission gives to one relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Profile {
-    /// Altitude above the ground, m: 0.1 to 1e5.
+    /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
     pub altitude_m: f32,
-    /// Transmit power, W: 1e-6 to 1e6.
+    /// Transmit power of the relay, W: 1e-6 to 1e6.
     pub power_w: f32,
 }
 
 impl Profile {
-    /// Returns true if altitude and power are within their ranges.
+    /// Returns true if the altitude and the transmit power are within their allowed ranges.
     pub const fn is_valid(&self) -> bool {
         within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
     }
 
-    /// Returns this altitude and power for a relay at y = 0.
+    /// Returns this altitude and power as those of a relay right above the line Tx to Rx (y = 0).
     pub const fn on_line(self) -> Station {
         Station {
             cross_section: CrossSection::on_line(self.altitude_m),
@@ -319,32 +303,39 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
     value >= least && value <= most
 }
 
-/// Validated mission with derived quantities.
+/// Validated mission: its parameters, and quantities derived from them.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Factor of a drone-to-drone SIR per watt. One interferer: `eta / (mu_los p_MSI)`, 1/W. Field:
-    /// `Upsilon_max / mu_los`, m^2/W.
+    /// Gain of a drone-to-drone hop per watt of the sender's power, in the formula of the hop's SIR. With one
+    /// interferer the gain is eta / (`mu_los` `p_MSI`), 1/W. eta and `mu_los` are the path-loss factors drone to
+    /// ground and drone to drone, and `p_MSI` is the interferer's power. In an interference field the gain is
+    /// `Upsilon_max` / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Factor of the SIR at Rx per watt, m^2/W, with noise. One interferer:
-    /// `(mu_nlos / eta) ((X - D)^2 + Y^2) / p_MSI`. Field: `Upsilon(D) / eta`.
+    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's power,
+    /// divided by the squared distance.
+    ///
+    /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
+    /// field it is Upsilon(D) / eta. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,
-    /// Noise divided by the interferer's power at 1 m: `nu = N eta / p_MSI`, 1/m^2. 0 without noise and in a field.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. It is 0 without
+    /// noise and for a mission with an interference field.
     pub(super) noise_at_a_metre: f32,
 }
 
-/// Maximum noise divided by the interferer's power at 1 m. Above it f32 rounding hides the interferer.
+/// Maximum receiver noise relative to the interferer's power received at 1 m. With more noise, f32 rounding would
+/// hide the interferer.
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
-    /// Maximum number of relays of a mission.
+    /// Maximum number of relays of a mission. Frames on the wire have room for more: node numbers up to 4094.
     pub const MAX_RELAYS: u16 = MAX_RELAYS;
 
     /// Creates a mission after checking every parameter.
     ///
-    /// In a constant use [`Mission::new`], which fails the build on an error.
+    /// Usable in a constant, where [`Mission::new`] turns an error into a failed build.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -460,10 +451,11 @@ impl Mission {
         })
     }
 
-    /// Creates a mission in a `const`; an invalid parameter fails the build.
+    /// Creates a mission in a `const`; an invalid parameter fails the build. In all other respects it is
+    /// [`Mission::try_new`].
     ///
-    /// Otherwise like [`Mission::try_new`]. [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant;
-    /// [`Channel::new`](crate::Channel::new) can. It takes factors, 10^(dB / 10).
+    /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant;
+    /// [`Channel::new`](crate::Channel::new), which takes the losses as factors, 10^(dB / 10), can:
     ///
     /// ```
     /// use uav_relay::channel::AirGround;
@@ -536,12 +528,12 @@ impl Mission {
         }
     }
 
-    /// Returns the parameters of the mission.
+    /// Returns the parameters from which the mission was created.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
     }
 
-    /// Returns the number N of relays.
+    /// Returns the number N of relays of the mission.
     pub const fn relays(&self) -> u16 {
         self.config.relays
     }
@@ -551,9 +543,8 @@ impl Mission {
         &self.config.interference
     }
 
-    /// Returns the interferer; `None` in an interference field.
-    ///
-    /// For an unknown interferer the result is a far substitute. Its interference is equal everywhere.
+    /// Returns the interferer; `None` for a mission with an interference field. For an unknown interferer the result is
+    /// a substitute far away, with equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -562,7 +553,7 @@ impl Mission {
         }
     }
 
-    /// Returns the interference field; `None` for a single transmitter.
+    /// Returns the interference field (distribution along x), or `None` for a single transmitter.
     pub const fn field(&self) -> Option<&Field> {
         match &self.config.interference {
             Interference::Field(field) if FIELD => Some(field),
@@ -570,7 +561,7 @@ impl Mission {
         }
     }
 
-    /// Returns the interference field plus receiver noise; `None` without a field.
+    /// Returns the interference field combined with the receiver noise. `None` for a mission without a field.
     #[doc(hidden)]
     pub const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
@@ -579,16 +570,20 @@ impl Mission {
         }
     }
 
-    /// Returns the noise divided by the interferer's power received at 1 m, 1/m^2.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m, 1/m^2. This is nu = N eta /
+    /// `p_MSI`.
     ///
-    /// nu = N eta / `p_MSI`. 0 without noise and in a field: Upsilon includes the noise.
+    /// The result is 0 without noise. It is also 0 in an interference field, because Upsilon of the field includes
+    /// the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
         if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
-    /// Returns the ratio r: SIR needed from Rx to Tx, divided by that from Tx to Rx.
+    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. It is 0 for one
+    /// direction.
     ///
-    /// 0 for one direction, and while the interferer is unknown. Constant without the feature `reverse`.
+    /// While the interferer is unknown r is 0, because relays then spread evenly. Without the feature `reverse` the
+    /// function returns a constant, so that the compiler drops the code for two directions.
     pub const fn reverse(&self) -> f32 {
         if REVERSE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.reverse
@@ -597,9 +592,8 @@ impl Mission {
         }
     }
 
-    /// Returns the SNR gap, linear; 0 for equal time slots.
-    ///
-    /// 0 while the interferer is unknown. Constant without the feature `altitude`.
+    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, because
+    /// relays then spread evenly. Without the feature `altitude` the function returns a constant.
     pub const fn fitted_gap(&self) -> f32 {
         if ALTITUDE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.fitted_gap
@@ -608,9 +602,8 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions.
-    ///
-    /// Toward Rx (relay 1 to N); in an interference field toward Tx (relay N to 1).
+    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to N), or in an
+    /// interference field toward Tx (relay N to 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
         match self.field() {
@@ -619,9 +612,8 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, which computes its position first.
-    ///
-    /// It is 1, or N in an interference field.
+    /// Returns the index of the leader, which computes its position first. It is 1, or N for a mission with an
+    /// interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -629,9 +621,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay that computes its position next after relay `index`.
-    ///
-    /// `None` if relay `index` is the last.
+    /// Returns the relay whose position is computed next after relay `index`. `None` if relay `index` is the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -657,11 +647,9 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the gain A of the first hop.
-    ///
-    /// The hop's SIR is A times the inverse interference ([`crate::sir::quiet`]), divided by the squared length. With
-    /// one interferer A is `p_t` / `p_MSI`, the powers of Tx and interferer. In an interference field A is `p_t`
-    /// `Upsilon_max` / eta.
+    /// Returns the gain A of the first hop. The SIR of this hop is A times the inverse interference
+    /// ([`crate::sir::quiet`]), divided by the squared length. With one interferer A is the power of Tx divided by the
+    /// power of the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
@@ -669,18 +657,17 @@ impl Mission {
 
     /// Returns the gain of a hop from a relay of `power_w` watts to another drone.
     ///
-    /// The hop's SIR is the gain times the inverse interference ([`crate::sir::quiet`]), divided by the squared length.
-    /// With one interferer the gain is (`p_u` / `p_MSI`) (eta / `mu_los`). `p_u` and `p_MSI` are the powers of relay
-    /// and interferer, eta and `mu_los` the path-loss factors drone to ground and drone to drone. In an interference
-    /// field it is `p_u` `Upsilon_max` / `mu_los`, with the largest E[1/I].
+    /// The hop's SIR is this gain times the inverse interference ([`crate::sir::quiet`]), divided by the squared
+    /// length. With one interferer the gain is (`p_u` / `p_MSI`) (eta / `mu_los`). `p_u` and `p_MSI` are the powers of
+    /// relay and interferer, eta and `mu_los` the path-loss factors drone to ground and drone to drone. In an
+    /// interference field the gain is `p_u` `Upsilon_max` / `mu_los`, with the field's largest E[1/I].
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// Returns the last hop's factor K, m^2, for a relay of `power_w` watts.
-    ///
-    /// The SIR at Rx is K divided by the squared length.
+    /// Returns the factor K of the last hop, m^2, for a last relay of `power_w` watts. The SIR at Rx is K divided by
+    /// the squared length of this hop.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -690,19 +677,19 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Returns G, m^2, which determines a single relay's optimal position.
+    /// Returns G, m^2, which determines the optimal position of a single relay of `power_w` watts.
     ///
-    /// G = K / A: the last hop's factor divided by the first hop's gain. The relay has `power_w` watts. With one
-    /// interferer at (X, Y) it is (`p_u` / `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the powers
-    /// of relay and Tx. `mu_nlos` is the path-loss factor interferer to Rx, eta that of drone to ground.
+    /// G is K / A: the last hop's factor K divided by the first hop's gain A. With one interferer at (X, Y) it is
+    /// (`p_u` / `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and of
+    /// Tx. `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
+    /// ground.
     #[doc(hidden)]
     pub fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
 
-    /// Returns the power that a relay receives from Tx, W.
-    ///
-    /// `squared_m2` is their squared distance, m^2.
+    /// Returns the power that a relay receives from Tx, W. `squared_m2` is the squared distance from Tx to the relay,
+    /// m^2.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -714,7 +701,8 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x between neighbours, m.
+    /// Returns the minimum step in x, m, that keeps two neighbours at their minimum separation. `across_squared`, m^2,
+    /// is their squared distance in y and altitude.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -723,22 +711,30 @@ impl Mission {
         sqrt(apart * apart - across_squared)
     }
 
-    /// Returns the minimum step in x plus a rounding margin, m.
+    /// Returns the minimum step in x for the separation of two neighbours, m, plus a margin for rounding.
+    /// `across_squared`, m^2, is their squared distance in y and altitude.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest x with room for later relays, m. Farthest is toward Rx, in a field toward Tx.
+    /// Returns the farthest allowed x of relay `index`, m, with room for the separation of later relays. Later relays
+    /// are those whose positions are computed after this one.
+    ///
+    /// Farthest means toward Rx, or toward Tx with an interference field. `across_squared` is the largest squared
+    /// distance, in y and altitude, between two neighbours among those later relays, m^2. It reduces their steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest x without room for later relays, m. Farthest is toward Rx, in a field toward Tx.
+    /// Returns the farthest allowed x of relay `index`, m, without room for the separation of later relays. Later
+    /// relays are those whose positions are computed after this one.
+    ///
+    /// Farthest means toward Rx, or toward Tx with an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Returns the number of relays computed after `index`.
+    /// Returns the number of relays whose positions are computed after relay `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -746,12 +742,12 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x with room for later relays, m.
+    /// Returns the largest x of relay `index`, m, with room for the separation of the relays nearer to Rx.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x if later relays share one x, m.
+    /// Returns the largest x of relay `index`, m, if the relays between it and Rx can share one x.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }
@@ -761,7 +757,7 @@ impl Mission {
         self.config.distance_m - after * self.step_of(least)
     }
 
-    /// Returns the step that is at least `least` after rounding, m.
+    /// Returns the step in x, m, that keeps two relays at least `least` metres apart after rounding to f32.
     fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
         if least > 0.0 {
@@ -780,13 +776,12 @@ impl Mission {
     }
 }
 
-/// Factor on a gain that halves the length of a hop.
+/// Factor on the gain of the first or last hop that makes this hop half as long as the others. In the best chain all
+/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// Returns the interferer if its position is known.
-    ///
-    /// `None` for an unknown interferer or an interference field.
+    /// Returns the interferer if its position is known. `None` for an unknown interferer or an interference field.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -796,7 +791,9 @@ impl Mission {
 
     /// Returns the mission with another `interference`.
     ///
-    /// `receiver_w` is that at Rx, W; 0 to compute it. `halved` makes the first or last hop half as long.
+    /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
+    /// `halved` has a flag for the first hop and a flag for the last hop. A hop with a true flag becomes half as long
+    /// as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -827,7 +824,8 @@ impl Mission {
     }
 }
 
-/// Substitute far away for an unknown interferer: equal everywhere, to 1e-7.
+/// Substitute for an interferer at an unknown position. It is so far away that all receivers have the same
+/// interference, to 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,
@@ -836,8 +834,10 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns gains of equal hops: first hop, others per watt, last per watt. A hop of length d has the SIR
-/// `(distance_m / d)^2`.
+/// Returns the gains for an unknown interferer, with which the best chain has hops of equal length.
+///
+/// They are the gain of the first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the
+/// transmit power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

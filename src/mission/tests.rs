@@ -4,7 +4,7 @@ use super::{Band, Interference, Interferer, Mission, MissionConfig, MissionError
 use crate::channel::{AirGround, Channel};
 use crate::features::{ALTITUDE, NOISE, REVERSE};
 
-/// Interferer of the paper's multi-hop scenario.
+/// Interferer of the paper's multi-hop scenario, which the tests use.
 pub(crate) const fn interferer() -> Interferer {
     Interferer {
         power_w: 80.0,

@@ -1,8 +1,7 @@
 //! Hop from Rx to the last relay: the largest x at which this relay receives Rx well enough.
 //!
-//! Rx sends, and relay N receives at x. With d = D - x this is a first hop seen from Rx, with the interferer at D - X,
-//! the gain A_rx of Rx's power and the target r gamma, in the notation of [`reverse`](super::reverse). With e, C and H
-//! of [`spacing`](super::spacing)
+//! Rx sends, and relay N receives at x. With d = D - x this is a first hop seen from Rx, with the interferer at D - X, the gain
+//! A_rx of Rx's power and the target r gamma, in the notation of [`reverse`](super::reverse). With e, C and H of [`spacing`](super::spacing)
 //!
 //! ```text
 //! f(d) = -e d^2 - 2 u d + C >= 0,    u = D - X
@@ -19,12 +18,12 @@
 //! | <= 0 | >= 0 | (u + r) / -e, the upper one |
 //! | <= 0 | < 0 | C / (u - r), the upper one |
 //!
-//! with r = sqrt(rho u^2 + e H) as there, none if the discriminant is negative. In each row both terms of the
-//! denominator have the same sign. With noise the root is the last one of the mirrored function g(-d), which the search
-//! of [`noisy_hop`](super::noisy_hop) finds. The other relays stay at that x too if their reaches are beyond it.
+//! with r = sqrt(rho u^2 + e H) as there, none if the discriminant is negative. In each row both terms of the denominator have
+//! the same sign. With noise the root is the last one of the mirrored function g(-d), which the search of
+//! [`noisy_hop`](super::noisy_hop) finds. The other relays stay at that x too if their reaches are beyond it.
 //!
-//! Relay N - 1 may not reach that x with data toward Rx. Relay N then goes to the largest x below that relay N - 1 does
-//! reach, and so on.
+//! If relay N - 1 does not reach that x with data toward Rx, relay N goes to the largest x below that it does reach,
+//! and so on.
 //!
 //! Accuracy: `host-tests/tests/both_ways` compares chains with a grid search in f64.
 
@@ -34,16 +33,16 @@ use crate::mission::{Interferer, Mission};
 use crate::place::Station;
 use crate::sir::{Sender, square};
 
-/// Hop from Rx to the last relay.
+/// Hop from Rx to the last relay: the first hop of data from Rx to Tx.
 pub(super) struct FromRx {
-    /// Mirrored hop: x is the distance from Rx.
+    /// Hop from Rx in a mirrored coordinate frame: x is the distance from Rx.
     hop: Hop,
     reverse: f32,
     distance_m: f32,
 }
 
 impl FromRx {
-    /// Returns the hop to the last relay, `own`. `None` without data from Rx to Tx.
+    /// Returns the hop from Rx to the last relay, `own`. `None` for a mission without data from Rx to Tx.
     pub(super) fn new(mission: &Mission, own: Station) -> Option<Self> {
         let (reverse, distance_m) = (mission.reverse(), mission.config().distance_m);
         if !(reverse > 0.0) {
@@ -72,7 +71,10 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin `(SIR / required SIR - 1) D`, m. Below 0 if `target` is missed.
+    /// Returns the SIR margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
+    ///
+    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. It is a continuous function
+    /// of `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -81,7 +83,8 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x that receives Rx well enough, m. `x_m` itself must miss `target`.
+    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx well enough. `None` if there
+    /// is no such x. Call it only if the SIR from Rx misses `target` at `x_m`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -96,7 +99,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay stays away from Rx if it is too weak.
+    /// Checks that the last relay stays farther from Rx if its SIR from Rx is too low. The search starts at x = 650 m,
+    /// a strong interferer is at x = 700 m, and Rx at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

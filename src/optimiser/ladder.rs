@@ -1,35 +1,41 @@
 //! Ladder: the target SIRs of one pass along the chain (a sweep), encoded in six bytes.
 //!
-//! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j -
-//! 7|. So a ladder is dense near the expected optimum and still spans the whole bracket. It is computed from target 7
-//! in both directions, so that rounding errors are largest at the ends. Every relay computes the targets from the six
-//! bytes with the same f32 operations, hence to the same bits.
+//! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j - 7|. So a
+//! ladder is dense near the expected optimum and still spans the whole bracket. It is computed from target 7 in both directions,
+//! so that rounding errors are largest at the ends. Every relay computes the targets from the six bytes with the same f32
+//! operations, hence to the same bits.
 
 use super::PerTarget;
 use crate::root::sqrt;
 
-/// Number of targets in a full ladder.
+/// Number of target SIRs in a full ladder, the list of targets of one sweep along the chain.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps in half a ladder.
+/// Number of gaps between targets in half of a full ladder, including the middle gap.
 const HALF: usize = TARGETS / 2;
 
-/// Ladder: rising target SIRs, encoded in six bytes.
+/// Ladder: rising list of target SIRs, linear, for one pass along the chain (a sweep). Encoded as one target and two
+/// one-byte codes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Eighth of 16 targets, linear SIR, or the only one.
+    /// Eighth of the 16 targets, linear SIR: the lower of the two in the middle. If there is only one target, it is
+    /// this one.
     anchor: f32,
-    /// Code of the middle relative gap; 0 for one target. 5 exponent and 3 mantissa bits.
+    /// Code of the relative gap between the two middle targets: their difference divided by the lower one. The code is
+    /// a float of 5 exponent and 3 mantissa bits. With code 0, `anchor` is the only target.
     gap: u8,
-    /// Code of the gaps' growth outward, `1 + growth / 16`.
+    /// Code of the growth of the gaps from the middle of the list to its ends. Each gap is 1 + `growth` / 16 times its
+    /// neighbour toward the middle.
     growth: u8,
-    /// True if every relay takes its farthest x; false if it may stop before.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
+    /// stay short of that x to help the next relay on the pass.
     plain: bool,
 }
 
 impl Ladder {
-    /// Returns a ladder with one target, above 0.
+    /// Returns a ladder (list of targets) with the single SIR `target`, above 0. If the chain meets `target`, the
+    /// last relay commits the chain to it.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -39,17 +45,19 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets with another `plain`.
+    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay takes the farthest
+    /// x that meets the target.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true if every relay takes its farthest x.
+    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In any other
+    /// pass a relay is allowed to stay short of this x to help the next relay.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
 
-    /// Returns 16 targets in equal ratios around `low` to `high`. 0 < `low` < `high`.
+    /// Returns 16 targets (a ladder) in equal ratios, from just below `low` to just above `high`. 0 < `low` < `high`.
     pub fn spanning(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -58,7 +66,7 @@ impl Ladder {
         )
     }
 
-    /// Returns 16 targets in equal ratios between `low` and `high`. 0 < `low` < `high`.
+    /// Returns 16 targets (a ladder) in equal ratios, strictly between `low` and `high`. 0 < `low` < `high`.
     pub fn between(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -67,7 +75,8 @@ impl Ladder {
         )
     }
 
-    /// Returns 16 targets dense around `centre`, which span [`low`, `high`].
+    /// Returns 16 targets (a ladder) that are dense around `centre` and span [`low`, `high`]. `centre` is in the
+    /// middle of a gap of the relative width `gap`; the gaps grow outward from there.
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
@@ -97,7 +106,8 @@ impl Ladder {
         }
     }
 
-    /// Decodes a ladder; `None` if invalid. Targets are normal f32 above zero. With `gap` 0, `growth` is 0.
+    /// Decodes a ladder (list of targets); `None` if it is invalid. A ladder is valid if all targets are normal f32s
+    /// above zero, and the encoding is unique. A single target (`gap` 0) must have `growth` 0.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -113,23 +123,23 @@ impl Ladder {
         (sound && unique).then_some(ladder)
     }
 
-    /// Returns the encoding: `anchor`, `gap` and `growth`.
+    /// Returns `anchor`, `gap` and `growth`, the encoding that [`Ladder::from_parts`] decodes.
     pub const fn parts(&self) -> (f32, u8, u8) {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true for a single target.
+    /// Returns true if the ladder has a single target. If the chain meets it, the last relay commits the chain to it.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }
 
-    /// Number of targets, 1 or [`TARGETS`].
+    /// Number of target SIRs in the list, 1 or [`TARGETS`].
     #[allow(clippy::len_without_is_empty, reason = "there is always a target")]
     pub const fn len(&self) -> usize {
         if self.is_single() { 1 } else { TARGETS }
     }
 
-    /// Returns the target SIRs, linear and ascending.
+    /// Returns the target SIRs, linear, in ascending order.
     pub fn targets(&self) -> PerTarget {
         if self.is_single() {
             return PerTarget::from([self.anchor]);
@@ -162,7 +172,8 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the highest target divided by the lower middle one.
+/// Returns the ratio of a ladder's highest target to the lower of its two middle targets. `gap` and `growth` are the
+/// codes in a [`Ladder`].
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -177,12 +188,13 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the relative gap `(1 + m / 8) 2^(e - 25)` of a code. m is its low three bits.
+/// Returns the relative gap between two targets for the byte `code`: (1 + m / 8) 2^(e - 25). m is the number in the low
+/// three bits of `code`, e the number in the other five bits.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }
 
-/// Returns the nearest code, 1 to 254.
+/// Returns the one-byte code, 1 to 254, of the relative gap nearest to `gap`.
 fn gap_code(gap: f32) -> u8 {
     let bits = gap.to_bits().saturating_sub(102 << 23);
     let rounded = bits.saturating_add(1 << 19) >> 20;

@@ -21,72 +21,76 @@ use crate::place::{CrossSection, Placement};
 use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
-/// Number of altitudes per round of the coarse-to-fine search.
+/// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
 const ROWS: u8 = 5;
 
-/// Number of rounds; each halves the range of altitudes.
+/// Number of rounds of the coarse-to-fine search. Each round halves the range of altitudes.
 const ROUNDS: u8 = 9;
 
-/// Number of bisection steps along x per altitude.
+/// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Intervals of x on each side of the interferer, both directions.
+/// Number of equal intervals of x on each side of the interferer, for data in both directions. The search evaluates
+/// both hops at the ends of the intervals.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
 
-/// Search for one relay's best position between its neighbours (Algorithm 2).
+/// Method by which one relay searches for its best position between its neighbours (Algorithm 2).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Coarse-to-fine search over altitudes.
-    ///
-    /// At most 1080 evaluations of both hops, 8730 with traffic in both directions.
+    /// Coarse-to-fine search over altitudes. It takes at most 1080 evaluations of both hops, 8730 with traffic in
+    /// both directions.
     #[default]
     Fine,
-    /// Grid of the paper: `columns` times `rows` evaluations of both hops.
+    /// Search on the paper's grid of positions, with `columns` times `rows` evaluations of both hops.
     Grid {
-        /// Number of positions along x, neighbours included: 2 to 255.
+        /// Number of positions of the grid along x, including the positions of the neighbours, 2 to 255.
         columns: u8,
-        /// Number of altitudes: 2 to 255.
+        /// Number of altitudes (rows) in the grid of candidate positions, 2 to 255.
         rows: u8,
     },
 }
 
-/// Neighbour of the relay whose position is searched.
+/// Neighbour of a relay whose position is searched. It is the other end of one of the relay's two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
     /// Position of the neighbour.
     pub place: Placement,
-    /// Minimum distance between neighbour and relay, m.
+    /// Minimum distance between the neighbour and the relay, m.
     pub apart_m: f32,
-    /// Transmit power of the neighbour, W.
+    /// Transmit power of the neighbouring node, W.
     pub power_w: f32,
 }
 
-/// Two hops of a relay, with the nodes toward Tx and Rx. First hop: `A q / l`, backward `returned / l`. Second hop:
-/// `received / l`, backward `A' q / l`. l: squared length, q: inverse interference at the relay. Backward SIRs are
-/// divided by r.
+/// Two hops of a relay at any position: from the node toward Tx, and to the node toward Rx.
+///
+/// l is the squared length of a hop, and q the inverse interference at the relay. For the hop from the node toward Tx
+/// the SIRs are A q / l, with the gain A, and backward `returned` / l. For the hop to the node toward Rx they are
+/// `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the required ratio of
+/// backward to forward SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A from the node toward Tx: SIR = `A q / l`.
+    /// Gain A of the hop from the node toward Tx. The hop's SIR is A times the inverse interference, divided by the
+    /// squared length.
     gain: f32,
-    /// SIR at the node toward Rx times squared length, m^2.
+    /// SIR at the node toward Rx that receives this relay, times the squared length of the hop, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
-    /// Noise divided by the interferer's power at 1 m, 1/m^2.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
 }
 
-/// Backward gains divided by r; infinite without such data.
+/// Gains of both hops for data from Rx to Tx, divided by r; infinite for a mission without such data.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// Backward SIR at the node toward Tx times squared length, m^2.
+    /// SIR at the node toward Tx that receives this relay, times the squared length of the hop, m^2.
     returned: f32,
-    /// Gain A' from the node toward Rx.
+    /// Gain A' of the backward hop from the node toward Rx to the relay.
     gain: f32,
 }
 
@@ -123,7 +127,8 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the two hops; `before` is `None` for Tx, `after` for Rx.
+    /// Returns the two hops of a relay of `power_w` watts. `before` is the node toward Tx (`None` for Tx), `after` the
+    /// node toward Rx (`None` for Rx).
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -159,7 +164,10 @@ impl Hops {
         }
     }
 
-    /// Returns the linear SIRs of both hops. Each is the lower of forward and backward / r.
+    /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
+    ///
+    /// For traffic in both directions, each result is the smaller of two SIRs: the forward SIR, and the backward SIR
+    /// divided by r. r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -180,19 +188,19 @@ impl Hops {
         REVERSE && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the SIR of the worse hop: the paper's local SIR.
+    /// Returns the SIR of the worse of the two hops with the relay at `at`: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
     }
 
-    /// Returns true if the hop from the relay is worse.
+    /// Returns true if the hop from the relay at `at` has a lower SIR than the hop to this relay.
     fn is_out_worse(&self, at: Placement) -> bool {
         let (incoming, outgoing) = self.both(at);
         incoming > outgoing
     }
 
-    /// Returns true if the minimum distances are kept.
+    /// Returns true if the relay at `at` keeps its minimum distance from both neighbours.
     fn is_clear(&self, at: Placement) -> bool {
         let clear = |of: HopEnd| {
             square(at.x_m - of.place.x_m) + square(at.altitude_m - of.place.altitude_m)
@@ -202,32 +210,35 @@ impl Hops {
     }
 }
 
-/// Search for a relay's best position, in steps.
+/// Search for a relay's best position between its two neighbours, in steps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalSearch {
     how: Local,
     hops: Hops,
     bottom_m: f32,
     top_m: f32,
-    /// Lowest altitude of the current round, m.
+    /// Lowest altitude that the current round of the coarse-to-fine search tries, m.
     low_m: f32,
-    /// Highest altitude of the current round, m.
+    /// Highest altitude that the current round of the coarse-to-fine search tries, m.
     high_m: f32,
     round: u8,
     row: u8,
     column: u8,
-    /// Best altitude of the round, m, and its worse hop's SIR.
+    /// Best altitude of the current round, m, and the SIR of the worse hop there.
     best_row: (f32, f32),
-    /// Best position; `None` if none beats the current one.
+    /// Best position found so far; `None` if no position is better than the relay's current one.
     found: Option<Placement>,
-    /// SIR of the worse hop at the best position, linear.
+    /// Linear SIR of the worse hop at the best position found. Before that it is the SIR at the current position.
     best_sir: f32,
-    /// Number of evaluations at this altitude; counted for both directions.
+    /// Number of evaluations at the current altitude. Counted only for data in both directions.
     evaluations: u16,
 }
 
 impl LocalSearch {
-    /// Starts the search at `at`, `explore_m` up and down. `band` are the allowed altitudes, m.
+    /// Starts the search of a relay at `at` for the position with the largest SIR of its two hops, `hops`.
+    ///
+    /// The search reaches up to `explore_m` metres above and below the present altitude. `band` is the lowest and the
+    /// highest allowed altitude, m.
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);
@@ -251,7 +262,10 @@ impl LocalSearch {
         }
     }
 
-    /// Continues by at most `budget` evaluations plus one altitude. `Ready` with a strictly better position.
+    /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. One altitude
+    /// takes 24 evaluations, or 194 for traffic in both directions.
+    ///
+    /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let mut left = budget;
         while left > 0 {
@@ -267,12 +281,13 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Records `at` if best; returns its worse hop's SIR. -1 if not allowed.
+    /// Records `at` as the best position if it is allowed and better than all earlier positions. Returns the SIR of
+    /// the worse hop at this position, or -1 if the position is not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
         self.record(at, self.hops.worse(at))
     }
 
-    /// Records `at` with the SIR `sir`, as [`weigh`](Self::weigh) does.
+    /// Records `at`, whose worse hop has the SIR `sir`, as [`weigh`](Self::weigh) does.
     fn record(&mut self, at: Placement, sir: f32) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
@@ -284,12 +299,14 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude, m: `part` 0 lowest, 1 highest.
+    /// Returns an altitude in the range of the current round, m. `part` 0 is the lowest altitude, 1 the highest. The
+    /// result never exceeds the highest altitude, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the next altitude; returns the evaluations, `None` at the end.
+    /// Searches the best x at the next altitude of the coarse-to-fine search. Returns the number of evaluations, or
+    /// `None` after the last round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;
@@ -318,7 +335,8 @@ impl LocalSearch {
         })
     }
 
-    /// Searches the best x at `altitude_m`; returns its worse hop's SIR. -1 if no x is allowed.
+    /// Searches the best x at `altitude_m`. For data in one direction both hops usually have equal SIRs there. Returns
+    /// the SIR of the worse hop at the best x found, or -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
@@ -343,7 +361,11 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Returns the best SIR of the worse hop, for x in `low` to `high`.
+    /// Returns the best SIR of the worse hop for x in `low` to `high`, for data in both directions.
+    ///
+    /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where the
+    /// SIRs of both hops are equal can be narrower than the spacing, so the first two x with equal SIRs are searched by
+    /// bisection.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
@@ -391,7 +413,8 @@ impl LocalSearch {
         best
     }
 
-    /// Evaluates the next grid position; `None` after the last.
+    /// Evaluates the next position of the grid. Returns the number of evaluations, 1, or `None` after the last
+    /// position.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;
@@ -419,7 +442,9 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns the search between two neighbours 100 m from each other.
+    /// Returns the search of a relay between two neighbours 100 m apart. `altitude_m` is the relay's altitude, and
+    /// `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band` the allowed
+    /// altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

@@ -22,5 +22,5 @@ pub mod reverse;
 pub mod search;
 pub mod spacing;
 
-/// List with a number for each target SIR.
+/// List with one number for each target SIR of a pass, for example a relay's farthest x, m.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

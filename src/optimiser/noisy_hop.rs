@@ -1,17 +1,16 @@
 //! Reach of a hop with receiver noise: a bounded search on intervals of known curvature.
 //!
-//! In the notation of [`spacing`](super::spacing), with rho = gamma / A, s(d) = (d - u)^2 + a^2 the squared distance
-//! from the interferer, l(d) = d^2 + b^2 that from the sender, and nu = N eta / P the noise over the interferer's power
-//! received at 1 m, the interference P / (eta s) becomes P / (eta s) + N, and so
+//! In the notation of [`spacing`](super::spacing), with rho = gamma / A, s(d) = (d - u)^2 + a^2 the squared distance from the interferer,
+//! l(d) = d^2 + b^2 that from the sender, and nu = N eta / P the noise over the interferer's power received at 1 m, the
+//! interference P / (eta s) becomes P / (eta s) + N, and so
 //!
 //! ```text
 //! SINR = A s / (l (1 + nu s)) >= gamma   <=>   g(d) = q(s(d)) - rho l(d) >= 0,    q(s) = s / (1 + nu s)
 //! ```
 //!
-//! which times 1 + nu s is a quartic in d. Only its last root before `high` is needed, and the search finds it from
-//! above. One bound is the noise-free reach, since a target that is missed without noise is missed with it; the other
-//! is the SNR alone, rho nu l <= 1. Where SINR only falls with d, the smaller bound is within a factor of sqrt(2) of
-//! the root.
+//! which times 1 + nu s is a quartic in d. Only its last root before `high` is needed, and the search finds it from above. One
+//! bound is the noise-free reach, since a target that is missed without noise is missed with it; the other is the SNR alone, rho
+//! nu l <= 1. Where SINR only falls with d, the smaller bound is within a factor of sqrt(2) of the root.
 //!
 //! **Curvature.** With w = 1 + nu s, v = 1 + nu a^2 and t = d - u
 //!
@@ -19,80 +18,87 @@
 //! g'' / 2 = (v - 3 nu t^2) / w^3 - rho
 //! ```
 //!
-//! falls with |t| where it is above 0. So g is concave everywhere if rho v^2 >= 1; otherwise it is convex within T of
-//! the interferer, and concave before and beyond. At T, w is the root of rho w^3 + 3 w = 4 v. The left side rises, so
-//! there is one root, found from 4 v / 3 by Newton's method from above.
+//! falls with |t| where it is above 0. So g is concave everywhere if rho v^2 >= 1; otherwise it is convex within T of the
+//! interferer, and concave before and beyond. At T, w is the root of rho w^3 + 3 w = 4 v. The left side rises, so there is one
+//! root, found from 4 v / 3 by Newton's method from above.
 //!
 //! **Search**, from the right, on at most three intervals, each of which starts where g < 0:
 //!
-//! - On a concave interval Newton's tangents from the right are above g, so no step passes the last root. The first
-//!   step that does not fall, or leaves the interval, proves that there is none.
-//! - On the convex interval g has a root if and only if g >= 0 at its left end, and then exactly one. Newton's tangents
-//!   from the left are below g, so no step passes it; each step is at least a bisection step.
+//! - On a concave interval Newton's tangents from the right are above g, so no step passes the last root, and the first step that
+//!   does not fall or leaves the interval proves that there is none.
+//! - On the convex interval g has a root if and only if g >= 0 at its left end, and then exactly one. Newton's tangents from the
+//!   left are below g, so no step passes it; each step is at least a bisection step.
 //!
-//! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and
-//! rises with the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in
-//! `host-tests/tests/noise/`.
+//! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and rises with
+//! the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
 //!
-//! `closest` finds the shortest length instead, by the same search of the mirrored hop. Without noise it is the closed
-//! form in [`from_rx`](super::from_rx).
+//! `closest` finds the shortest length instead, by the same search of the mirrored hop. Without noise it is the closed form in
+//! [`from_rx`](super::from_rx).
 
 use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum target divided by gain; above it no hop is short enough.
+/// Maximum ratio of a hop's target SIR to its gain; with a larger ratio no hop is short enough. All numbers stay
+/// finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
-/// Maximum number of Newton steps; usual are four to eight.
+/// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
 const STEPS: u8 = 32;
 
-/// Maximum number of bisection steps.
+/// Maximum number of steps of a search by bisection, each of which at least halves the interval.
 pub(super) const HALVINGS: u8 = 32;
 
-/// Newton steps to find where the curvature changes its sign.
+/// Number of Newton steps for the hop length at which the curvature of the margin g changes its sign. g is 0 or above
+/// where a hop with noise meets its target.
 const TURNS: u8 = 5;
 
-/// Relative rounding error of the margin to the target.
+/// Rounding error of the margin of a hop with noise, relative to the required value. A target that is missed by at most
+/// this error counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// Relative change of length that ends the search.
+/// Relative change of the hop length below which the search for the maximum length ends.
 const CLOSE: f32 = 5e-7;
 
-/// Hop with noise that has to meet one target.
+/// Hop with receiver noise that has to meet one target SIR. Its methods compute the lengths along x at which it does.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
-    /// Target divided by gain: rho.
+    /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times the inverse interference, divided by
+    /// the squared length.
     pub(super) ratio: f32,
-    /// Difference rho - 1, without cancellation.
+    /// Difference rho - 1, computed without cancellation. rho is the hop's target SIR divided by its gain.
     pub(super) excess: f32,
-    /// Distance u along x from sender to interferer, m.
+    /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
-    /// Squared distance a^2 from interferer to receiver perpendicular to x, m^2.
+    /// Squared distance a^2 of the receiver from the interferer perpendicular to x, m^2.
     pub(super) aside_squared: f32,
-    /// Squared distance b^2 from sender to receiver perpendicular to x, m^2.
+    /// Squared distance b^2 of the receiver from the sender perpendicular to x, m^2.
     pub(super) across_squared: f32,
-    /// Difference `a^2 - b^2`, m^2, without cancellation.
+    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the interferer,
+    /// b from the receiver to the sender. The difference is computed without cancellation.
     pub(super) base: f32,
-    /// Noise divided by the interferer's power at 1 m, 1/m^2; above 0.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2, above 0.
     pub(super) noise: f32,
 }
 
 impl NoisyHop {
-    /// Returns the longest hop by SNR alone, m, at most 1e9.
+    /// Returns the hop length along x, m, up to which the SNR alone meets the target, at most 1e9. `None` if no length
+    /// does.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns true if `d` metres along x meet the target.
+    /// Returns true if the hop meets its target with the receiver `d` metres from the sender along x.
     pub(super) fn is_met(&self, d: f32) -> bool {
         let s = square(d - self.ahead) + self.aside_squared;
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the margin to the target, half its derivative, its rounding error. `d` must meet the target by SNR
-    /// alone.
+    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error.
+    ///
+    /// g, m^2, is at least 0 if the hop meets its target SIR. `d` is along x, m. It must be so short that the noise
+    /// alone does not make the hop miss the target.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -113,7 +119,8 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance where the margin's curvature changes sign, m. `None` if concave everywhere.
+    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes sign. `None` if g is
+    /// concave everywhere. g is 0 or above where the target is met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -127,8 +134,8 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// Returns the largest length in [`low`, `high`] that meets the target, m. `high` is at most
-    /// [`through_noise`](Self::through_noise). At most 96 evaluations, usually five.
+    /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m. `None` if there is none.
+    /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -158,7 +165,10 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest length that meets the target, m. The margin must be concave, and below 0 at `high`.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. `None` if there is none. The
+    /// margin g is 0 there; at lengths that meet the target it is 0 or above.
+    ///
+    /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -181,8 +191,10 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest length that meets the target, m. The margin must be convex, at least 0 at `low`, below 0 at
-    /// `high`.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 there; at
+    /// lengths that meet the target it is 0 or above.
+    ///
+    /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {
@@ -207,7 +219,7 @@ impl NoisyHop {
     }
 }
 
-/// Returns `x_m - d`, m, rounded down.
+/// Returns `x_m` - `d`, m, rounded down. The result is at least `d` smaller than `x_m`, in spite of rounding.
 pub(super) fn before(x_m: f32, d: f32) -> f32 {
     let place = x_m - d;
     if x_m - place < d {
@@ -217,7 +229,9 @@ pub(super) fn before(x_m: f32, d: f32) -> f32 {
     }
 }
 
-/// Returns the shortest length that meets the target, m. `least` must miss it.
+/// Returns the shortest length from `least` to `most`, m, at which `hop` meets its target.
+///
+/// `None` if there is no such length. The hop must not meet the target at `least`.
 pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     if !(hop.ratio <= MOST_RATIO) {
         return None;
@@ -234,7 +248,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the length above which a noise-free hop meets the target, m.
+/// Returns the length, m, above which a hop without noise meets the target. The margin to the target is 0 at this
+/// length, and rises with it. `None` if there is no such length; the length can be negative.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -257,7 +272,8 @@ mod tests {
     use super::{NoisyHop, closest};
     use crate::features::NOISE;
 
-    /// Returns [`closest`] by fine steps.
+    /// Returns the smallest length at which `hop` meets its target, m, by trial in fine steps. Reference for
+    /// [`closest`].
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;
         (0..=20_000_u16)

@@ -6,14 +6,13 @@
 //! counts. So no chain that meets the target is excluded, and a missed target is out of reach of every chain. See
 //! [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may have to hold back.
 //!
-//! When the verdict travels back along the chain, each relay takes its position.
-//! [`required_position`](Link::required_position) returns the position that the previous relay must take. In a *plain*
-//! pass no relay holds back: every hop leads from reach to reach, as in the paper.
+//! When the verdict travels back along the chain, each relay takes its position, and
+//! [`required_position`](Link::required_position) returns the position that the previous relay of the pass must take.
+//! In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
-//! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0
-//! if the target is missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit,
-//! if any. A `Walk` is a whole chain for one target, without messages: reaches from the leader to the last relay, and
-//! required positions on the way back.
+//! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0 if the target is
+//! missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole
+//! chain for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
 
 use core::iter::successors;
 
@@ -29,24 +28,27 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of tried positions of the last relay.
+/// Maximum number of positions that the last relay tries to receive Rx well enough. Used only with data in both
+/// directions.
 const HOLDS: u8 = 4;
 
-/// Maximum field points per call, unless one target needs more.
+/// Maximum number of field points that one call evaluates. The evaluation of one target is completed even if it needs
+/// more.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Previous relay along the chain, by its message.
+/// Previous relay of a pass along the chain, as its message describes it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
     /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
-    /// Upsilon (mean inverse interference), 1/W, if measured. Used only toward Tx.
+    /// Upsilon, the mean inverse interference power that the previous relay has measured, 1/W. `None` to use the
+    /// mission's interference field. Only passes toward Tx use it.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a previous relay at y = 0 without measurement.
+    /// Returns a previous relay with this altitude and power, lateral offset 0, and no measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -55,33 +57,38 @@ impl Behind {
     }
 }
 
-/// Relay with all data for its farthest x.
+/// Relay in a pass along the chain, with all data for its reach at a target SIR.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
     pub mission: &'a Mission,
-    /// Previous relay; `None` if it is Tx or Rx.
+    /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
-    /// Index: 1 next to Tx, N next to Rx.
+    /// Index of the relay in the chain: 1 for the relay next to Tx, N for the relay next to Rx.
     pub index: u16,
-    /// Lateral offset, altitude and power of this relay.
+    /// Lateral offset, altitude and transmit power of this relay.
     pub own: Station,
-    /// Upsilon (mean inverse interference) here, 1/W, if measured.
+    /// Upsilon, the mean inverse interference power, measured by the relay, 1/W. `None` to use the mission's
+    /// interference field.
     pub measured_per_w: Option<f32>,
-    /// True if every relay takes its farthest x; false if it may stop before.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
+    /// stay short of that x to help the next relay on the pass.
     pub plain: bool,
-    /// Maximum x with room for later relays, m. Only in the joint method.
+    /// Maximum x of the relay, m, which leaves the relays toward Rx room for their separation. Only the joint method
+    /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// Fixed x, m; `None` for equal time slots.
+    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets there. `None` unless the
+    /// mission has fitted slots (time slots as long as each hop needs).
     pub fixed_m: Option<f32>,
 }
 
-/// Returns [`origin`] once for every target.
+/// Returns the x at which a pass starts, repeated for every target, m. It is the x of Tx, or of Rx in an interference
+/// field.
 pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the first sender's x, m: Tx, in a field Rx.
+/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx with an interference field.
 pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -90,7 +97,11 @@ pub fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends this relay's reach for each target not in `reaches` yet. The list ends before the first missed target.
+    /// Appends to `reaches` this relay's reaches for all `targets` whose reach is not in the list yet.
+    ///
+    /// `targets` is in ascending order, and entry i of each list belongs to target i. `from` has the reaches of the
+    /// previous relay of the pass, m. The list ends before the first target that cannot be met. Work for each target:
+    /// one computation of a hop; in an interference field, up to three for each point of the field.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -133,8 +144,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Continues [`extend`](Self::extend); true at the end. One call: 16 reaches; in a field 128 points, at least one
-    /// reach.
+    /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
+    /// computes 16 reaches. In an interference field it computes as many reaches as take 128 evaluations of the
+    /// field's points, but at least one.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -149,7 +161,8 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop meets `target`. Both directions must meet it; relays must keep order and separation.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. Both
+    /// directions must meet it, and two relays must be in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -211,12 +224,15 @@ impl<'a> Link<'a> {
         }))
     }
 
-    /// Returns the previous relay's maximum x toward Tx, m.
+    /// Returns the maximum x of the previous relay in a pass toward Tx, m.
+    ///
+    /// Relays nearer to Rx need no separation in x: at different altitudes they can be above each other.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop with the smallest x of this relay, its sender. If `plain`, the receiver is at `low`.
+    /// Returns the hop that allows this relay, its sender, the smallest x. The hop's receiver is at x from `low` to
+    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -237,7 +253,12 @@ impl<'a> Link<'a> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the slack for `target`, and this last relay's x, m.
+    /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
+    ///
+    /// `reach` is this relay's reach, and `from_m` the reach of the previous relay. `None` if Rx is out of reach from
+    /// everywhere. For a pass toward Rx the slack is `reach` plus the maximum length of the last hop, minus D. For a
+    /// pass toward Tx the slack is the maximum length of the first hop minus this relay's x; the x is chosen so that
+    /// the slack is largest.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -286,7 +307,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x that receives the previous relay, m.
+    /// Returns the largest x up to `most_m`, m, at which this relay receives the pass's previous relay. The previous
+    /// relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -294,7 +316,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the slack and this last relay's x, m, both directions.
+    /// Returns the chain's slack and this last relay's x, m, for data in both directions. `hop` leads from Rx to this
+    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if its
+    /// SIR from Rx would be too low there.
     fn held(
         &self,
         hop: &FromRx,
@@ -325,7 +349,11 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the previous relay must take, if any.
+    /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
+    ///
+    /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
+    /// position. The search assumes that the possible positions of the previous relay are one interval, although this
+    /// interval can have gaps. Work: at most two reaches; in an interference field three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -388,7 +416,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the last relay's result for all targets.
+/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the reaches
+/// of this relay, and `from` those of the previous relay of the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -400,17 +429,22 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result for all targets: slacks, and the committed target.
+/// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the committed target, if any.
+    /// Index of the committed target in the pass's list of targets. The relays take their positions for this target.
+    /// `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
-    /// Slack per target, m; 0 or more if met.
+    /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
+    /// target.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
-    /// Returns the result for `ladder`; `slacks` are in m.
+    /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's slacks, m, one for each of its `targets`.
+    ///
+    /// The highest target that the chain meets is committed in two cases: the next higher target is missed and within the mission's
+    /// tolerance; or the ladder has a single target, as in the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -437,7 +471,8 @@ impl Verdict {
     }
 }
 
-/// Returns the number of targets up to the highest met. Lower missed targets count as met.
+/// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
+/// is 0 or more. In a varying field, or with different altitudes, lower targets can be missed; they count all the same.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -445,7 +480,7 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
         .map_or(0, |last| last + 1)
 }
 
-/// Whole chain for one target, without messages.
+/// Computation of a whole chain for one target, in one program and without messages.
 #[derive(Debug)]
 pub struct Walk<'a, F> {
     pub mission: &'a Mission,
@@ -464,7 +499,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns this chain with all relays at their farthest x.
+    /// Returns this chain with relays that all take their farthest x.
     pub const fn plainly(&self) -> Self {
         Self::new(self.mission, self.target, true, self.profile_of)
     }
@@ -483,7 +518,9 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns index, previous reach and own reach, m, per relay. It ends at a missed target.
+    /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
+    ///
+    /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
     pub fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
         let mut reach = origin(self.mission);
         let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
@@ -494,7 +531,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns relay `index`'s reach, m, if all can take theirs. Index 0 only checks.
+    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. `index` is 0
+    /// for no relay: the result is then `Some` if all relays can take their reaches.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -513,7 +551,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         None
     }
 
-    /// Returns relay `index`'s reach, m; for `None` the first sender's x.
+    /// Returns the reach of relay `index`, m. If `index` is `None`, it returns the x at which the pass starts. The
+    /// result is `None` if a hop cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let Some(index) = index else {
             return Some(origin(self.mission));
@@ -522,7 +561,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns relay `index`'s x, m, if all x are possible. Index 0 only checks.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. `index` is 0 for no
+    /// relay: the result is then `Some` if all relays can take their required positions.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -544,7 +584,12 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes all positions from the last relay, at `place`, to the first.
+    /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
+    /// x = `place`, m.
+    ///
+    /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
+    /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
+    /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
     pub fn settle(
         &self,
         place: f32,
@@ -564,7 +609,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     }
 }
 
-/// Returns the index of the relay that computes last.
+/// Returns the index of the last relay of a pass.
 const fn last(mission: &Mission) -> u16 {
     match mission.heading() {
         Heading::TowardRx => mission.relays(),

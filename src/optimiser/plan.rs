@@ -1,7 +1,7 @@
 //! Whole chain from the mission alone, without messages: the radio-silent form of Algorithm 1.
 //!
-//! It uses the same functions as the relays, so its result equals the relays' agreement to the bit. The leader predicts
-//! with it, a radio-silent relay computes its own position, and so does a planner.
+//! It uses the same functions as the relays, so its result equals the relays' agreement to the bit. The leader predicts with it,
+//! a radio-silent relay computes its own position, and so does a planner.
 
 use super::PerTarget;
 use super::ladder::Ladder;
@@ -10,28 +10,30 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Agreed target SIR, and its ladder (list of targets).
+/// Target SIR on which the chain has agreed, and the ladder (list of targets) of the last pass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
-    /// List of targets with the committed one.
+    /// Ladder (list of target SIRs) of the last pass along the chain. The committed target is one of them.
     pub ladder: Ladder,
-    /// Index of the committed target in the ladder.
+    /// Index of the committed target SIR in the ladder.
     pub commit: u8,
-    /// Agreed target SIR, linear.
+    /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
-    /// Target SIR that no chain here meets, linear. `None` with the paper's step or both directions.
+    /// Target SIR that no chain at these altitudes can meet, linear. `None` with the paper's fixed step, whose passes
+    /// do not try all chains, and for data in both directions.
     pub most: Option<f32>,
-    /// Number of target lists tried.
+    /// Number of passes along the chain that the search took.
     pub sweeps: u32,
 }
 
-/// Solver of a whole chain without messages.
+/// Solver for the positions of a whole chain in one program, without messages between relays. It computes a few hops
+/// per call. Its size does not depend on the number of relays.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
     reaches: PerTarget,
-    /// Farthest x of the current relay per target, m.
+    /// Farthest x of the current relay for each target, m; the list grows from call to call.
     next: PerTarget,
     index: u16,
     behind: Option<Behind>,
@@ -42,7 +44,7 @@ impl Planner {
     /// Starts to solve `mission`, whose leader has the profile `leader`.
     ///
     /// # Errors
-    /// [`Infeasible`] if no SIR above zero is possible at Rx.
+    /// [`Infeasible`] if no SIR above zero is possible at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let search = Search::new(mission, leader, schedule)?;
         let mut planner = Self {
@@ -64,10 +66,14 @@ impl Planner {
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
-    /// Computes at most `hops` hops; `Ok(Some(..))` once solved. `profile_of` must always return the same.
+    /// Computes at most `hops` hops of a pass along the chain; `Ok(Some(..))` once the chain is solved.
+    ///
+    /// For a hop it computes the farthest x of one relay for each of at most 16 targets. In an interference field a
+    /// call computes as many of these x as take 128 evaluations of the field's points, but at least one. `profile_of`
+    /// returns the profile of relay 1..=N, and must always return the same.
     ///
     /// # Errors
-    /// [`Infeasible`] if no target is left.
+    /// [`Infeasible`] if no target is left to try.
     #[inline(never)] // frees its stack before a sweep starts
     pub fn step(
         &mut self,
@@ -117,7 +123,9 @@ impl Planner {
     }
 }
 
-/// Solves the chain in one call: at most some fifty target lists.
+/// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
+///
+/// If some relays have to stay short of their farthest position, their positions are checked, too.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -154,7 +162,10 @@ pub fn solve(
 }
 
 impl Mission {
-    /// Returns relay `index`'s position without messages, if any. All relays must have the mission's profile.
+    /// Returns the position that relay `index` computes without messages. All relays must have the mission's profile.
+    ///
+    /// This position is, to the bit, the position on which relays agree by messages:
+    /// `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`. `None` if no target can be met.
     pub fn silent_place(&self, index: u16) -> Option<Placement> {
         let common = |_| self.config().common;
         let agreed = solve(self, Schedule::Bracketed, common).ok()?;

@@ -1,15 +1,14 @@
 //! Maximum distance of a sender from its receiver in a field. Algorithm 4's steps back from Rx, in closed form.
 //!
-//! The receiver's position is known, and with it Upsilon. With the receiver at (x0, h0), its sender at (x0 - d, h) and
-//! A = p Upsilon(x0) / `mu_los` for a sender of p watts, E(SIR) >= gamma is
+//! The receiver's position is known, and with it Upsilon. With the receiver at (x0, h0), its sender at (x0 - d, h) and A = p
+//! Upsilon(x0) / `mu_los` for a sender of p watts, E(SIR) >= gamma is
 //!
 //! ```text
 //! d^2 <= A / gamma - (h - h0)^2
 //! ```
 //!
-//! This is the paper's eq. (num), for relays at different altitudes. For the last hop x0 = D, h0 = 0 and A = p
-//! Upsilon(D) / eta. The printed algorithm lets a position become negative; here a sender stops where there is just
-//! room for those before it.
+//! This is the paper's eq. (num), for relays at different altitudes. For the last hop x0 = D, h0 = 0 and A = p Upsilon(D) / eta.
+//! The printed algorithm lets a position become negative; here a sender stops where there is just room for those before it.
 //!
 //! The receiver need not be as close to Tx as possible: with less interference the hop may be longer. The positions of
 //! a relay from which the chain can be continued to Rx form a range [l, r], and the next range starts at
@@ -18,11 +17,10 @@
 //! l_k = min { y - d(y) : l_{k+1} <= y <= r_{k+1} }.
 //! ```
 //!
-//! Between two points of the field d(y)^2 = c Upsilon(y) - q with q = (h - h0)^2 is linear in y, so y - d(y) is convex
-//! where it is defined. Its minimum is at an end, where d falls to the minimum step, or where d'(y) = 1: d = c b / 2
-//! with b the slope of Upsilon. `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/` compares it with
-//! grids of positions. If a minimum separation or a climb excludes some y, the ranges may have holes, and l_k is a
-//! bound.
+//! Between two points of the field d(y)^2 = c Upsilon(y) - q with q = (h - h0)^2 is linear in y, so y - d(y) is convex where it
+//! is defined. Its minimum is at an end, where d falls to the minimum step, or where d'(y) = 1: d = c b / 2 with b the slope of
+//! Upsilon. `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/` compares it with grids of positions. If a minimum
+//! separation or a climb excludes some y, the ranges may have holes, and l_k is a bound.
 //!
 //! # Way back
 //!
@@ -33,8 +31,8 @@
 //! (y - x)^2 <= A' / gamma - q.
 //! ```
 //!
-//! Between two points of the field the right side is linear in x, so the margin is concave there. The first x from
-//! which both directions work is a root of a quadratic.
+//! Between two points of the field the right side is linear in x, so the margin is concave there, and the first x from which both
+//! directions work is a root of a quadratic.
 //!
 //! If x stays between two points of the field, and y too, each direction allows a convex set of pairs (x, y). So the
 //! smallest x has one of three kinds of y: the smallest or largest y of that part of the field, the y that is best for
@@ -45,9 +43,8 @@
 //! z^2 = c Upsilon(y) - q,    c Upsilon(y) = c' Upsilon(x).
 //! ```
 //!
-//! The second equation is linear in x and z, and leaves a quadratic for z. `longest` compares all these y. For a given
-//! x the set of y that both directions allow is exact: the y up to x + sqrt(A' / gamma - q). The y of a range that lie
-//! in a hole are refused.
+//! The second equation is linear in x and z, and leaves a quadratic for z. `longest` compares all these y. For a given x the set of y
+//! that both directions allow is exact: the y up to x + sqrt(A' / gamma - q). The y of a range that lie in a hole are refused.
 //!
 //! Accuracy: `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` compares with f64, and
 //! `the_best_places_in_a_field_are_found` in `host-tests/tests/both_ways/field.rs` compares chains with a grid search.
@@ -61,29 +58,36 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// Relative rounding tolerance on a hop's maximum squared length.
+/// Relative tolerance, for rounding errors, on the maximum squared length of a hop toward Tx.
 const ROUNDING: f32 = 4e-6;
 
-/// Maximum number of f32 steps that shorten a hop.
+/// Maximum number of f32 steps that shorten a computed hop until it meets its target.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in a field, from a searched sender.
+/// Hop toward Rx in an interference field, with a receiver at a known position. It gives the sender's x for each
+/// target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A, m^2: SIR = `A quiet / squared length`. `quiet` is Upsilon divided by the largest.
+    /// Gain A of the hop, m^2. The hop's SIR is A times `quiet`, divided by the squared length.
+    ///
+    /// `quiet` is Upsilon at the receiver divided by the field's largest Upsilon. Upsilon = E[1/I] is the mean inverse
+    /// of the interference power I. For the hop to Rx, A includes Upsilon at Rx, and `quiet` is 1.
     gain: f32,
-    /// Squared altitude difference of the hop, m^2.
+    /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest permitted x of the sender, m.
+    /// Smallest permitted x of this hop's sender, m from Tx.
     end_m: f32,
     to_rx: bool,
-    /// Backward gain / r, and the interference at its receiver, if any.
+    /// Backward hop from the receiver to the sender: its gain, and the interference at the sender. `None` for data in
+    /// one direction. The gain is for the field's largest Upsilon = E[1/I]. It is divided by r, the required ratio of
+    /// backward to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
 impl<'a> Retreat<'a> {
-    /// Returns the hop to a relay at `altitude_m`; `None` for Rx.
+    /// Returns the hop from relay `index` to a relay at `altitude_m`, m; with `None` it leads to Rx. `own` has the
+    /// altitude and power of relay `index`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb_squared = square(own.cross_section.altitude_m - altitude_m.unwrap_or(0.0));
         let (gain, least_step) = match altitude_m {
@@ -104,7 +108,11 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Adds the backward hop, if the mission has one. `measured_per_w` is Upsilon at its receiver, 1/W.
+    /// Returns this hop together with the backward hop, if the mission has data from Rx to Tx.
+    ///
+    /// The backward hop's sender, which receives this hop, has `power_w` watts; `None` if it is Rx. The backward hop's
+    /// receiver, which sends this hop, has measured `measured_per_w`: Upsilon, the mean inverse interference power,
+    /// 1/W.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,
@@ -129,7 +137,7 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with any sender x down to Tx.
+    /// Returns this hop with a sender at any x down to Tx: relays closer to Tx need no separation along x.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -137,7 +145,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest permitted x of the receiver, m.
+    /// Returns the smallest permitted x of the receiver, m. It is the sender's smallest permitted x plus the minimum
+    /// step.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -147,8 +156,11 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x that meets `target`, in [end, `from_m`], m. `quiet` is Upsilon divided by the largest.
-    /// Rounded toward the receiver.
+    /// Returns the smallest x in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
+    ///
+    /// `target` is a linear SIR above zero. `from_m` is the receiver's x, from 0 to the x of Rx, m. `quiet` is above
+    /// 0: Upsilon = E[1/I] at the receiver divided by the field's largest Upsilon, and 1 at Rx. The result is rounded
+    /// toward the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let place = self.onward(target, from_m, quiet)?;
         match self.back() {
@@ -157,7 +169,11 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x in [`place`, `most_m`) that receives the backward hop, m.
+    /// Returns the smallest x, m, at which this hop's sender receives the backward hop. `None` if there is none.
+    ///
+    /// The x is at least `place` and below `most_m`. This hop's receiver, at x = `from_m`, sends the backward hop.
+    /// `c` is the gain for the field's largest Upsilon, divided by the target. Work: at most one root for each field
+    /// point from `place` to `from_m`.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(
         &self,
@@ -210,8 +226,8 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest receiver x whose backward hop reaches `place`, m. Infinite for one direction, -infinite if
-    /// none.
+    /// Returns the largest x of the receiver, m, at which the sender at `place` receives the backward hop. The result
+    /// is infinite for data in one direction, and -infinite if no x meets `target`.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;
@@ -224,7 +240,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns [`Retreat::reach`] for data toward Rx only.
+    /// Returns the x of [`Retreat::reach`] for data toward Rx only; `None` if there is none.
     fn onward(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {
@@ -252,7 +268,8 @@ impl<'a> Retreat<'a> {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop with the smallest x of its sender.
+    /// Returns the hop that meets `target` with the smallest x of the sender; `None` if no hop meets it. The x of the
+    /// receiver is from `low` to `high`, m.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -267,7 +284,8 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns [`Retreat::longest`] for both directions; `there` is that toward Rx.
+    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is this hop for data toward Rx
+    /// only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
         &self,
@@ -313,7 +331,11 @@ impl<'a> Retreat<'a> {
         best
     }
 
-    /// Returns the smallest sender x for a receiver at `y_m`, m.
+    /// Returns the smallest x of the sender for a receiver at `y_m`, m. `quiet` is the receiver's Upsilon divided by
+    /// the field's largest Upsilon.
+    ///
+    /// Without `best_m` only data toward Rx count. With `best_m` both directions count. The result is then below
+    /// `best_m`, and replaces it.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -325,7 +347,7 @@ impl<'a> Retreat<'a> {
         Some(from_m)
     }
 
-    /// Returns the hop that [`least`] finds.
+    /// Returns the hop with the smallest x of its sender, by the search of [`least`] for the receiver's x.
     #[inline(never)] // one copy for data in one and in both directions
     fn searched(
         &self,
@@ -342,7 +364,11 @@ impl<'a> Retreat<'a> {
         least(interference, self.gain / target, squares, low, high, value)
     }
 
-    /// Returns the receiver x that just meet both directions, m. `gains` are divided by the target.
+    /// Returns the x of the receiver, m, for each hop that just meets the target in both directions. There are at most
+    /// two.
+    ///
+    /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
+    /// backward gain, each divided by the target.
     fn equal_limits(&self, gains: [f32; 2], from: Piece, to: Piece) -> [Option<f32>; 2] {
         let [c, back] = gains;
         let (rise, back_rise) = (c * to.slope, back * from.slope);
@@ -364,7 +390,7 @@ impl<'a> Retreat<'a> {
         })
     }
 
-    /// Returns [`Retreat::longest`] for data toward Rx only.
+    /// Returns the hop of [`Retreat::longest`] for data toward Rx only.
     pub(super) fn longest_there(
         &self,
         interference: HopInterference<'_>,
@@ -376,26 +402,29 @@ impl<'a> Retreat<'a> {
     }
 }
 
-/// Hop along the line: x of receiver and sender.
+/// Hop along the line: the x of its receiver and the x of its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
-    /// x of the receiver, m.
+    /// x of the receiver of this hop, m from Tx.
     pub to_m: f32,
-    /// x of the sender, m.
+    /// x of the sender of this hop, m from Tx.
     pub from_m: f32,
 }
 
-/// Interference at a receiver as a function of x.
+/// Interference at a hop's receiver, as a function of the receiver's x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
-    /// Measured Upsilon at every x, divided by the field's largest.
+    /// Measured interference, taken as equal at every x. The value is the measured Upsilon, the mean inverse
+    /// interference power, divided by the largest Upsilon of the mission's field.
     Evenly(f32),
-    /// Interference field with receiver noise.
+    /// Interference field of the mission, with receiver noise.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the measurement, or else the field.
+    /// Returns the interference at a receiver: its measurement if there is one, else the mission's field.
+    /// `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both measurement and field
+    /// include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -404,7 +433,8 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns Upsilon = E[1/I] at `x_m`, divided by the largest.
+    /// Returns Upsilon at `x_m` as a fraction of the largest Upsilon of the interference field. Upsilon is the mean
+    /// inverse interference power, E[1/I].
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
             Self::Evenly(quiet) => quiet,
@@ -412,7 +442,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the field from `start_m` to the next point.
+    /// Returns the part of the field from `start_m`, m, to the next point of the field or to `end_m`.
     #[inline(never)] // one copy for all loops
     fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {
@@ -436,19 +466,26 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Part of the field with a linear Upsilon.
+/// Part of the interference field in which Upsilon is linear in x. Upsilon = E[1/I] is the mean inverse interference
+/// power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Piece {
     start_m: f32,
     end_m: f32,
-    /// Upsilon at this part's smallest x, divided by the largest.
+    /// Upsilon at the smallest x of this part, divided by the field's largest Upsilon. Upsilon is the mean inverse
+    /// interference power.
     level: f32,
     /// Change of `level` per metre of x.
     slope: f32,
 }
 
-/// Returns the hop with the smallest sender x, then receiver x. `value` is `y - sqrt(c quiet - s)` with
-/// `s = squares[0]`, for receiver y. Three values per reachable field point.
+/// Returns the hop with the smallest x of its sender, for a receiver's x in [`low`, `high`], m. Of equally good hops it
+/// returns the one with the smallest x of the receiver.
+///
+/// `value` returns the sender's x, y - sqrt(`c` quiet - s), for the receiver's x, y, and for `quiet`. `quiet` is
+/// Upsilon = E[1/I] at y divided by the field's largest Upsilon. `c` is the sender's gain divided by the target, and s
+/// is the first of `squares`. `value` returns `None` if the square under the root is below the second of `squares`
+/// minus the first. Work: at most three values for each field point from `low` to `high` that a hop could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

@@ -1,7 +1,7 @@
 //! Hop for data from Rx to Tx (the way back), and the combined reach of a hop in both directions.
 //!
-//! On the way back from Rx to Tx hop k is sent by node k and received by node k - 1. So another power, and the
-//! interference at another position, count. With node 0 = Tx, node N + 1 = Rx, the path gain g and the noise N
+//! On the way back from Rx to Tx hop k is sent by node k and received by node k - 1, so another power and the interference at
+//! another position count. With node 0 = Tx, node N + 1 = Rx, the path gain g and the noise N
 //!
 //! ```text
 //! F_k = P_(k-1) g / (I_k + N),    B_k = P_k g / (I_(k-1) + N),    SIR of the chain = min over k of min(F_k, B_k / r)
@@ -34,14 +34,14 @@
 //! problem of the [last hop](super::from_rx), with x in place of Rx. On that branch F_k / gamma = (A r / A') q(s) /
 //! q(s0), and without noise, at equal altitudes, with c^2 = A' / (r gamma) and the angle v between the directions from
 //! the sender to the interferer and to the receiver
+//! the directions from the sender to the interferer and to the receiver
 //!
 //! ```text
 //! s / s0 = 1 + c^2 - 2 c cos v
 //! ```
 //!
-//! by the law of cosines. It rises with x0, while x falls. So from the combined reach of M on, x is feasible up to one
-//! point, which a bisection finds. It is needed only if the way back limits the reach of M, and ends at once if a
-//! little more is infeasible.
+//! by the law of cosines. It rises with x0, while x falls. So from the combined reach of M on, x is feasible up to one point, which a
+//! bisection finds. It is needed only if the way back limits the reach of M, and ends at once if a little more is infeasible.
 //!
 //! Accuracy: `host-tests/tests/both_ways` compares chains with a grid search in f64.
 
@@ -51,27 +51,29 @@ use crate::place::CrossSection;
 use crate::root::sqrt;
 use crate::sir::{in_noise, square, transmitter_gain};
 
-/// Limit of a squared length, m^2: numbers stay finite.
+/// Limit of the squared length of a hop in the computation, m^2, so that no number becomes infinite.
 const MOST_SQUARED: f32 = 1e18;
 
-/// Backward hop, prepared for many targets and lengths.
+/// Backward hop, for data from Rx to Tx, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Backward gain / r: SIR / r = `gain q / l`, q inverse interference, l squared length. At Tx, m^2, it includes the
-    /// interference.
+    /// Gain of the backward hop, divided by r, the required ratio of backward to forward SIR. The hop's SIR is the
+    /// gain times the inverse interference, divided by the squared length. For a hop to Tx the gain, m^2, includes
+    /// the interference at Tx.
     gain: f32,
-    /// True if Tx is the receiver.
+    /// True if Tx is the receiver of this hop, false if a relay is.
     to_tx: bool,
-    /// x of the interferer, m.
+    /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance receiver to interferer perpendicular to x, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Noise divided by the interferer's power at 1 m, 1/m^2.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
 }
 
 impl Back {
-    /// Returns the backward hop to `to` or Tx, if any.
+    /// Returns the backward hop from a relay of `power_w` watts to a relay at `to`, or to Tx. `None` for a mission
+    /// without data from Rx to Tx.
     #[inline(never)] // keeps a sweep without a way back small
     pub(super) fn new(
         mission: &Mission,
@@ -98,7 +100,8 @@ impl Back {
         })
     }
 
-    /// Returns the squared maximum length times the target, m^2.
+    /// Returns the squared maximum length of a backward hop, times the forward target SIR, m^2. The receiver is at
+    /// `x_m`.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -107,13 +110,15 @@ impl Back {
         self.gain * in_noise(squared, self.noise)
     }
 
-    /// Returns the maximum length along x, m, if any.
+    /// Returns the maximum length of the backward hop along x, m, for its receiver at `x_m`. `across_squared` is the
+    /// squared distance of the hop's ends perpendicular to x, m^2. `None` if no length meets the target.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns the backward hop as a function of its length.
+    /// Returns the backward hop for `target` from a sender at `x_m`, as a function of its length along x.
+    /// `across_squared` is the squared distance of the hop's ends perpendicular to x, m^2.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -127,14 +132,18 @@ impl Back {
         }
     }
 
-    /// Returns the distance from the interferer below which `target` is missed, m. `None` if missed everywhere.
+    /// Returns the distance along x from the interferer, m, below which a receiver misses `target`. `None` if every
+    /// receiver misses it. The backward hop has the squared length `squared`, m^2.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }
 }
 
-/// Returns the distance from the interferer below which q < `needed`, m. `q = s / (1 + noise s)`, s the squared
-/// distance. `None` if everywhere.
+/// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
+///
+/// q = s / (1 + `noise` s) is the inverse of interference plus noise. s is the squared distance from the interferer,
+/// m^2; `aside_squared` is its part perpendicular to x. `None` if q is less than `needed` at any distance, because of
+/// the noise.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

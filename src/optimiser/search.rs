@@ -2,12 +2,12 @@
 //!
 //! It implements both schedules of Algorithm 1. The paper's schedule tries gamma_0, gamma_0 - epsilon, ..., one in each
 //! pass. The bracketed schedule tries a ladder of targets in each pass. A chain that meets a target also meets lower
-//! ones. So the optimum is between the highest target that was met and the lowest that was missed. The slacks are
+//! ones, so the optimum is between the highest target that was met and the lowest that was missed. The slacks are
 //! smooth in log gamma, so inverse interpolation places the dense middle of the next ladder. Its ends still span the
 //! *bracket*: the range of targets that may be the highest feasible one.
 //!
-//! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as
-//! met. All other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
+//! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as met. All
+//! other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
 //!
 //! A pass assumes that a relay's positions are an interval without holes. If a separation is binding there may be a
 //! hole, and a relay whose required position is in it refuses. Then a plain pass finds a target that no relay can
@@ -25,27 +25,24 @@ use crate::root::sqrt;
 use crate::side::Heading;
 use crate::sir::{self, Sender};
 
-/// Order of the target SIRs that the leader tries.
+/// Schedule of the target SIRs that the leader tries, one pass along the chain after another.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets at once, around the interpolated optimum.
-    ///
-    /// The search ends once the optimum is known to the mission's tolerance.
+    /// Sixteen targets per pass along the chain, around the interpolated optimum. The search ends once the optimum is
+    /// known to the mission's tolerance.
     #[default]
     Bracketed,
-    /// Single targets, falling in equal steps, as in the paper.
-    ///
-    /// The first target is the upper bound.
+    /// A single target per pass along the chain, falling in equal steps, as in the paper. The first target is the
+    /// upper bound.
     FixedStep {
-        /// Step between two targets, linear SIR, above 0.
-        ///
-        /// It is an f64, because it is subtracted up to ten thousand times.
+        /// Step epsilon between two targets, linear SIR, above 0. The type is f64, because the step is subtracted up to
+        /// ten thousand times from the first target.
         step: f64,
     },
 }
 
-/// The chain meets no target, not even 1e-12 times the upper bound.
+/// Error: the chain meets no target SIR, not even 1e-12 times the upper bound.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Infeasible;
@@ -60,47 +57,53 @@ impl core::error::Error for Infeasible {}
 
 const HIGHEST: f32 = 1e30;
 
-/// Lowest tried target, as a fraction of the upper bound.
+/// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation, in gaps.
+/// Maximum difference between cubic and linear interpolation for which the cubic result is used. The unit is the gap
+/// between two targets.
 const BEND: f32 = 0.25;
 
-/// Maximum bracket width after / before for interpolated targets.
+/// Maximum ratio of the bracket's width after a pass to its width before. With a larger ratio the next targets are
+/// spread evenly over the bracket (the interval that contains the best target), not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
-/// Number of target lists after which the search ends.
+/// Number of passes along the chain after which the search ends with the best feasible target found.
 const MOST_SWEEPS: u32 = 48;
 
-/// Leader's search for the highest target: bracket and next targets.
+/// State of the leader's search for the highest target SIR: the bracket and the next targets to try.
 #[derive(Clone, Debug)]
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound of the SIR, linear.
+    /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
     ceiling: f32,
-    /// First target, gamma_0 of the paper.
+    /// First target of the fixed-step schedule, and upper bound of the bracketed schedule. It is gamma_0 of the
+    /// paper.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the previous bracket (interval of targets).
+    /// Relative width of the bracket before the last pass: `infeasible` / `feasible` - 1.
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True if relays take their farthest x. Always in the paper's schedule, and after a refusal.
+    /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule has
+    /// only plain passes. They are also used after a relay has refused a target, because it cannot take the x that the
+    /// next relay requires.
     plain: bool,
-    /// Lowest target that no chain meets; `None` if unknown.
+    /// Lowest target SIR known to be infeasible for every chain; `None` if no such target is known.
     most: Option<f32>,
-    /// Bisection for a target that all relays accept, after a refusal.
+    /// Bisection for a target that all relays accept. `None` until a relay has refused a target.
     trials: Option<StandTrials>,
     both_ways: bool,
 }
 
 impl Search {
-    /// Creates the search of a leader with the profile `leader`.
+    /// Creates a search by the leader of `mission` with the profile `leader`. The other relays can have other profiles.
     ///
     /// # Errors
-    /// [`Infeasible`] if the interferer is at Rx.
+    /// [`Infeasible`] if a relay right above the receiver gives the receiver an SIR of 0, because the interferer is
+    /// at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {
             distance_m, common, ..
@@ -152,19 +155,22 @@ impl Search {
         })
     }
 
-    /// Returns the next target SIRs.
+    /// Returns the target SIRs (ladder) for the next pass along the chain.
     pub const fn ladder(&self) -> &Ladder {
         &self.ladder
     }
 
-    /// Replaces the next targets by `ladder`. If it is plain, all later ones are.
+    /// Replaces the next targets by `ladder`, which the leader expects to end the search. If `ladder` is for a plain
+    /// pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target that no chain meets, if known. `None` for data in both directions and after plain
-    /// ladders.
+    /// Returns the lowest target known to be infeasible for every chain; `None` if no such target is known.
+    ///
+    /// `slacks` are the chain's slacks, m, for the targets of the last pass. Plain passes prove nothing, because they
+    /// do not try all chains. `None` for data in both directions.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if REVERSE && self.both_ways {
             // For data in both directions it is not proven that reaches and held positions exclude no chain.
@@ -178,10 +184,13 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues with the slacks, m, of [`Search::ladder`]'s first targets.
+    /// Continues the search after a pass. `slacks` are the chain's slacks, m, one for each target that every hop can meet. These targets
+    /// are the first ones of [`Search::ladder`].
+    ///
+    /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
     /// # Errors
-    /// [`Infeasible`] if no target is left.
+    /// [`Infeasible`] if no target is left to try.
     pub fn advance(&mut self, slacks: &[f32]) -> Result<(), Infeasible> {
         self.tried = self.tried.saturating_add(1);
         if let Some(trials) = &mut self.trials
@@ -273,7 +282,10 @@ impl Search {
     }
 }
 
-/// Lowers `start` and `met` for data from Rx to Tx.
+/// Lowers the targets `start` and `met` to allow for data from Rx to Tx, and returns both.
+///
+/// `start` is the upper bound of the search. It becomes at most the maximum SIR of the backward hop to Tx. `met` is a
+/// feasible target. It becomes a target that this hop and the backward hop from Rx also meet.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -294,7 +306,10 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target with slack 0, by cubic interpolation. `None` if a straight line differs much: the slack jumps.
+/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target).
+///
+/// The cubic curve passes through the four points next to the change of sign. `None` if a straight line gives a very
+/// different target: the slack then jumps, and neither target is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -314,7 +329,8 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Returns the polynomial's value at 0; `points` must fall in x.
+/// Returns the value at 0 of the polynomial through `points`, pairs of x and value. `None` unless the x strictly fall
+/// from point to point.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {
@@ -329,18 +345,23 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     points.first().map(|point| point.1)
 }
 
-/// Bisection for the highest target that all relays accept.
+/// Bisection for the highest target that all relays accept. A relay refuses a target if it cannot take the position
+/// that the next relay requires.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest accepted target and its ladder; `None` before the first.
+    /// Highest target that all relays accepted, and the ladder that proposes it again. `None` until a target is
+    /// accepted.
     best: Option<(f32, Ladder)>,
-    /// True once the search has ended.
+    /// True once the bisection has ended. The best target found is then the result.
     over: bool,
 }
 
 impl Search {
-    /// Returns the refused target, if any.
+    /// Returns the target that a relay has refused in the last pass; `None` if there is none.
+    ///
+    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the commit
+    /// from `verdict`, the result of the pass. The refused target follows from the slacks in `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
@@ -351,7 +372,7 @@ impl Search {
         targets.get(usize::from(due)).copied()
     }
 
-    /// Records that all accepted `target`; returns true at the end.
+    /// Records that all relays accepted the target SIR `target`; returns true if the search is over.
     pub fn accept(&mut self, target: f32) -> bool {
         let own = Ladder::single(target).plainly(self.plain);
         let Some(trials) = &mut self.trials else {
@@ -363,7 +384,10 @@ impl Search {
         last || self.try_next().is_err() || self.trials.is_some_and(|trials| trials.over)
     }
 
-    /// Continues after a relay refused `target`.
+    /// Continues after a relay refused its required position for `target`.
+    ///
+    /// A plain pass first finds a target that no relay can refuse: every relay takes the farthest x that meets it. The
+    /// interval up to the refused target is then bisected. `most` is a target that no chain can meet, if known.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.
@@ -393,7 +417,8 @@ impl Search {
         Ok(())
     }
 
-    /// Selects the next target; at the end the best accepted one.
+    /// Selects the next target of the bisection. Once the interval is small enough, it selects the best accepted
+    /// target, and the search ends.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

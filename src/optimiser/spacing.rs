@@ -1,15 +1,15 @@
 //! Reach of a hop. The closed forms of the paper's `d_1`, `d_k` and `d_max` are one numerically stable rule.
 //!
-//! With the sender at (x0, y0, h0), the receiver at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the
-//! sender's gain, SIR >= gamma is
+//! With the sender at (x0, y0, h0), the receiver at (x0 + d, y, h), the interferer at (X, Y, 0), u = X - x0 and A the sender's
+//! gain, SIR >= gamma is
 //!
 //! ```text
 //! f(d) = -e d^2 - 2 u d + C >= 0,    e = gamma / A - 1,    C = u^2 + H,
 //! H = (Y - y0) (Y + y0 - 2y) + h0 (2h - h0) - e ((y - y0)^2 + (h - h0)^2)
 //! ```
 //!
-//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. It is `end` if f is not negative there, and otherwise
-//! the largest root inside, which depends on the signs of e, u and C:
+//! The reach is the largest d in `[0, end - x0]` with f(d) >= 0. It is `end` if f is not negative there, and otherwise the
+//! largest root inside, which depends on the signs of e, u and C:
 //!
 //! | C | u | largest root below `end` |
 //! | --- | --- | --- |
@@ -18,9 +18,9 @@
 //! | < 0 | < 0 and e > 0 | (r - u) / e, if inside |
 //! | < 0 | otherwise | none: the target is infeasible |
 //!
-//! with r = sqrt((gamma / A) u^2 + e H). The discriminant u^2 + e C is the same number, but cancels, and so does 1 + e
-//! for small targets. e is computed from a gain of twice f32's width, so targets close to A lose no digits. The printed
-//! case distinction selects wrong roots once the chain has passed the interferer.
+//! with r = sqrt((gamma / A) u^2 + e H). The discriminant u^2 + e C is the same number, but cancels, and so does 1 + e for small
+//! targets. e is computed from a gain of twice f32's width, so targets close to A lose no digits. The printed case distinction
+//! selects wrong roots once the chain has passed the interferer.
 //!
 //! If the sender may be anywhere in [0, x0], only the position closest to the receiver matters: it is received best,
 //! and the interference at the receiver does not depend on it. For a receiver at x up to x0 plus the minimum step s,
@@ -29,18 +29,15 @@
 //! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
 //! ```
 //!
-//! which is true except within w of the interferer. So if the target cannot be met from x0, the sender may *hold back*
-//! for a receiver at X - w: to climb before it comes near, or to leave the minimum step.
-//! `near_optimal_at_mixed_altitudes` and `near_optimal_with_a_separation` in `host-tests/tests/exact.rs` compare this
-//! with a search over all positions.
+//! which is true except within w of the interferer. So if the target cannot be met from x0, the sender may *hold back* for a
+//! receiver at X - w: to climb before it comes near, or to leave the minimum step. `near_optimal_at_mixed_altitudes` and
+//! `near_optimal_with_a_separation` in `host-tests/tests/exact.rs` compare this with a search over all positions.
 //!
 //! For the joint method `Hop::stretched` is the reach as a differentiable function.
 //!
-//! With receiver noise the reach has no closed form: [`noisy_hop`](super::noisy_hop) searches it, starting from this
-//! one.
+//! With receiver noise the reach has no closed form: [`noisy_hop`](super::noisy_hop) searches it, starting from this one.
 //!
-//! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection
-//! in f64.
+//! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection in f64.
 
 use super::noisy_hop::{HALVINGS, MOST_RATIO, NoisyHop, before, closest};
 use super::reverse::{Back, zone};
@@ -50,18 +47,19 @@ use crate::place::{CrossSection, Station};
 use crate::root::{bisected, sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Position required from the previous relay.
+/// Position that the previous relay must take so that this relay's hop meets the target SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// The previous node takes its farthest x, or cannot move.
+    /// The previous node must take its farthest x that meets the target. Also returned for Tx and Rx, which cannot
+    /// move.
     AtReach,
-    /// The previous relay takes this x, m, before its farthest.
+    /// The previous relay must take this x, m, which is short of its farthest x that meets the target.
     At(f32),
 }
 
 impl RequiredPosition {
-    /// Returns the required x, m; `reach_m` is the farthest.
+    /// Returns the required x of the previous relay, m. `reach_m` is its farthest x that meets the target.
     pub(crate) const fn or_reach(self, reach_m: f32) -> f32 {
         match self {
             Self::AtReach => reach_m,
@@ -70,34 +68,42 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared for many targets.
+/// Hop toward Rx, prepared for many targets. Its maximum length for a target takes three divisions and a square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
-    /// x of the interferer, m.
+    /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance receiver to interferer perpendicular to x, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Difference a^2 - b^2 of squared distances perpendicular to x, m^2. `(Y - y0) (Y + y0 - 2y) + h0 (2h - h0)`: no
-    /// cancellation.
+    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is the receiver's distance from the
+    /// interferer, b its distance from the sender.
+    ///
+    /// The difference is a term of the equation for the hop's maximum length; it does not depend on the target. It is
+    /// computed without cancellation as (Y - y0) (Y + y0 - 2y) + h0 (2h - h0). The interferer is at the lateral
+    /// offset Y on the ground, the sender at the lateral offset y0 and altitude h0, the receiver at y and h.
     base: f32,
-    /// Squared distance receiver to sender perpendicular to x, m^2.
+    /// Squared distance of receiver and sender perpendicular to x, m^2.
     across_squared: f32,
-    /// Noise divided by the interferer's power at 1 m, 1/m^2.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
     least_step: f32,
-    /// True if the sender is Tx, which cannot move closer.
+    /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
-    /// Largest permitted x of the receiver, m.
+    /// Largest permitted x of this hop's receiver, m from Tx.
     end_m: f32,
-    /// Maximum x of receiver and sender, m.
+    /// Maximum x of the receiver and of the sender, m. They leave the relays nearer to Rx room for their minimum
+    /// separation.
     gathered_m: [f32; 2],
-    /// Backward hop; `None` without data from Rx to Tx.
+    /// Same hop in the direction from Rx to Tx; `None` for a mission without data from Rx to Tx.
     back: Option<Back>,
 }
 
 impl Hop {
-    /// Creates the hop to relay `index` at `at`.
+    /// Creates the hop from `sender` to relay `index`, which has the lateral offset and altitude `at`.
+    ///
+    /// `spread_squared` concerns the relays after `index`: it is the largest squared distance between two neighbours
+    /// perpendicular to x, m^2.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -123,7 +129,9 @@ impl Hop {
         }
     }
 
-    /// Creates the hop to `at` with x up to `end_m`, without minimum length.
+    /// Creates the hop from `sender` to a receiver at an x up to `end_m`. `at` is the receiver's lateral offset and
+    /// altitude. The hop has no minimum length. `noise` is the noise divided by the interferer's power received at
+    /// 1 m, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -153,7 +161,8 @@ impl Hop {
         if REVERSE { self.back.as_ref() } else { None }
     }
 
-    /// Adds the backward hop, sent with `power_w` watts, if any.
+    /// Returns this hop together with the backward hop, if the mission has data from Rx to Tx. `power_w` is the power
+    /// of the relay that receives this hop and sends the backward hop, W.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {
@@ -162,7 +171,7 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with any receiver x up to Rx.
+    /// Returns this hop with a receiver at any x up to Rx: relays nearer to Rx need no separation along x.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -174,8 +183,11 @@ impl Hop {
         Self { end_m, ..self }
     }
 
-    /// Returns the largest x in [`from_m`, end] that meets `target`, m. Rounded toward the sender. At most 96
-    /// evaluations, without noise one.
+    /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m. `None` if there is none.
+    ///
+    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to the x of Rx. The result is rounded
+    /// toward the sender, so it meets the target as an f32. Constant work; with noise at most 96 evaluations of the
+    /// hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_simple() {
             self.in_silence(target, from_m)
@@ -194,7 +206,8 @@ impl Hop {
         self.ending(place).onward(target, from_m)
     }
 
-    /// Returns the largest x that meets `target` toward Rx, m.
+    /// Returns the largest x at which the receiver meets `target`, m, for data toward Rx only. The sender is at x =
+    /// `from_m`. `None` if no x meets `target`.
     fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -246,7 +259,11 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x that meets `target` with any sender up to `from_m`, m.
+    /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`].
+    /// `None` if no x meets `target`.
+    ///
+    /// If the receiver has such a position at least the minimum step beyond `from_m`, the result is [`Hop::reach`]
+    /// for a sender at `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self
             .reach(target, from_m)
@@ -257,7 +274,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x that meets `target` both ways, m.
+    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The sender is in [0,
+    /// `from_m`]. `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The result
+    /// is larger than `place` if a sender at a smaller x receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -277,7 +296,8 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x up to `near`, both directions, m.
+    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. `None` if there is
+    /// none. The receiver is at x = `place`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -327,7 +347,7 @@ impl Hop {
         (self.before(place) >= 0.0).then_some(place)
     }
 
-    /// Returns the largest sender x separated from `place`, m.
+    /// Returns the largest x, m, at which a sender keeps the minimum separation from a receiver at `place`.
     fn before(&self, place: f32) -> f32 {
         let from = place - self.least_step;
         if place - from < self.least_step || from >= place {
@@ -337,7 +357,11 @@ impl Hop {
         }
     }
 
-    /// Returns the required sender position, if permitted.
+    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if the sender has no
+    /// permitted position.
+    ///
+    /// `from_m` is the sender's farthest x that meets `target`. The required position is the permitted position
+    /// closest to the receiver, because it has the best SIR.
     pub fn required_position(
         &self,
         target: f32,
@@ -382,7 +406,11 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x that meets `target`, m, without a minimum step. It must be smooth in `target`.
+    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. So the result
+    /// is a smooth function, as the joint method requires.
+    ///
+    /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance perpendicular to
+    /// x alone exceeds the hop's maximum length.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -433,10 +461,11 @@ impl Hop {
     }
 }
 
-/// Relative rounding tolerance of a hop's SIR.
+/// Relative tolerance of a hop's SIR for rounding errors, when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns `from_m + d`, m, rounded down. `None` if equal: x must differ.
+/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the result equals `from_m`: two relays must not have
+/// the same x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -452,8 +481,12 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the paper's `d_max`, `sqrt(K / gamma - y^2 - h^2)`, m, at most 1e9. `None` if even a relay right above Rx is
-/// too weak. It can exceed the Tx-Rx distance: smooth for the root search.
+/// Returns the paper's `d_max`, m: the largest distance along x at which a relay meets `target` at Rx.
+///
+/// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared distance),
+/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above the receiver
+/// is too weak. The result can exceed the distance from Tx to Rx. So it is a smooth function of the target, as the root
+/// search requires.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
@@ -461,7 +494,7 @@ pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<
 }
 
 impl Hop {
-    /// Returns true without noise and without data toward Tx.
+    /// Returns true for a hop without noise in a chain that carries data toward Rx only.
     pub(super) fn is_simple(&self) -> bool {
         self.is_silent() && self.back().is_none()
     }
@@ -470,12 +503,14 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns the noise divided by the interferer's power at 1 m, 1/m^2. Constant without the feature `noise`.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2. Without the feature
+    /// `noise` it is the constant 0, so that the compiler drops the search in noise.
     fn nu(&self) -> f32 {
         if NOISE { self.noise } else { 0.0 }
     }
 
-    /// Returns [`Hop::reach`] with noise, m.
+    /// Returns the largest x at which the receiver meets `target`, m: [`Hop::reach`] for a hop with noise. `None` if
+    /// no x meets `target`.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;

@@ -37,8 +37,8 @@
 //! | does not fit | does not fit, by the same factor | the path loss over the ground differs from the mission's: the receiver's level is used |
 //! | does not fit, or no level | does not fit, or another factor | a sensor is faulty or a hill is in the way: the receiver's level is used |
 //!
-//! At least three relays are required, consistent and more than the unknowns. A faulty end stays so until it fits or
-//! the other does not.
+//! At least three relays are required, consistent and more than the unknowns. A faulty end stays so until it fits or the other
+//! does not.
 
 use super::fit::Fit;
 use super::sums::Place;
@@ -46,73 +46,83 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Measured / expected variance that starts the search.
+/// Variance of the measurements, divided by the expected one, above which a faulty relay is searched. The operator sets
+/// the expected variance.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum drop of the residual without the faulty relay, in variances.
+/// Minimum drop of the fit's residual without the faulty relay. The unit is the variance of the other measurements.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual and drop that show a faulty relay.
+/// Minimum residual of the fit, and minimum drop without one relay, that can show a faulty relay. The residual is the
+/// sum of squared relative errors. One measurement that is wrong by some 15 % causes this residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of second smallest to smallest variance.
+/// Minimum ratio of the second smallest variance to the smallest that identifies a faulty relay. Each variance belongs
+/// to a fit that leaves out one relay.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of consistent relative differences: 0.32^2, some 1.5 dB.
+/// Maximum variance of the relative differences between consistent measurements and their fit. The standard deviation
+/// is 0.32, or some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
-/// Number of collections between a failed search and the next.
+/// Number of sensing passes between a failed search for a faulty relay and the next one. A sensing pass collects
+/// measurements.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay fits again; the larger counts. A multiple of the variance, and a squared
-/// relative difference.
+/// Limits within which an excluded relay's measurement fits the others again. The first is a multiple of the variance,
+/// the second a squared relative difference. The larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays to identify a faulty one. With four, the other three always fit.
+/// Minimum number of relays to identify a faulty relay. With four relays only three measurements are left, which always
+/// fit the three unknowns.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions; older ones count less ([`Sums::count`]).
+/// Minimum number of measured positions to find a faulty relay. Older positions count less, see [`Sums::count`].
 const ENOUGH: f32 = 3.5;
 
-/// Maximum mean weight / weight of one position; above it rounding dominates.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above it, rounding errors
+/// of the sums exceed this relay's part of the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Normal,
-    /// Trial: a collection without this node. If the others fit far better, it is faulty.
+    /// Trial: a sensing pass that leaves out the measurements of the node with this number. If the measurements of
+    /// the other nodes fit far better then, that node is faulty.
     Trying(u16),
-    /// Notice: a collection that tells this node that it is excluded. The flag is false in the first: measurements are
-    /// discarded. It is true in the second: they give the estimate.
+    /// Notice: a sensing pass that tells the faulty node, which has this number, that it is excluded.
+    ///
+    /// There are two such passes. In the first one the flag is false, and the measurements of the other nodes are
+    /// discarded. In the second one the flag is true, and they give the estimate.
     Announcing(u16, bool),
 }
 
-/// Leader's search for a relay with faulty measurements.
+/// State of the leader's search for the relay with faulty measurements.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial {
     stage: Stage,
-    /// Number of collections before the next search.
+    /// Number of sensing passes (collections of measurements) before the next search is allowed to start.
     cooldown: u8,
-    /// Node whose exclusion gave the smallest variance.
+    /// Node whose exclusion has given the smallest variance so far.
     best: u16,
-    /// Residual with all relays: sum of squared relative errors.
+    /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
-    /// Residual without `best`: sum of squared relative errors.
+    /// Residual of the fit without the node `best`: sum of the squared relative errors.
     seen_best: f32,
-    /// Smallest variance of a fit without one node, `best`.
+    /// Smallest variance of relative errors among the fits that each leave out one node. The node left out is `best`.
     least: f32,
-    /// Second smallest variance of a fit without one node.
+    /// Second smallest variance of relative errors among the fits that each leave out one node.
     second: f32,
 }
 
-/// Action after a collection of measurements.
+/// Action after a sensing pass, as decided by the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
-    /// Use the measurements for the estimate.
+    /// Use the measurements of this sensing pass for the interference estimate.
     Review,
-    /// Use the measurements: which relay is faulty is unknown.
+    /// Use the measurements although they are inconsistent, because it is unknown which relay is faulty.
     Unknown,
-    /// Discard the measurements, and collect again soon.
+    /// Discard the measurements of this sensing pass, and start another sensing pass soon.
     Again,
 }
 
@@ -127,7 +137,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// Node left out of the next collection; 0 for none.
+    /// Node whose measurements the next sensing pass leaves out; 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Normal => 0,
@@ -135,7 +145,8 @@ impl Trial {
         }
     }
 
-    /// Evaluates a collection; node numbers are 1 to `nodes`.
+    /// Evaluates the `sums` of a sensing pass in the search for a faulty relay. The chain has `relays` members, whose
+    /// node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -223,10 +234,12 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor between measurement and estimate that a relay doubts.
+/// Factor between measurement and estimate above which a relay doubts its measurement. A factor below the inverse has
+/// the same effect.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if a measurement is absurd, far from `expected`.
+/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. It is then far off the estimate
+/// `expected` at that place, and does not fit the other relays' measurements, whose sums are `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -246,8 +259,11 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if an excluded relay still does not fit `others`. Compared is `(v / e - e / v) / 2`, measured v = 1e-12
-/// W / I, fitted e. `expected` sets the weight.
+/// Returns true if the measurement of an excluded relay still does not fit the other relays.
+///
+/// The measurement v = 1e-12 W / I at `place` is compared with e, the value of the fit to the other relays' sums,
+/// `others`. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the current
+/// estimate, and sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -269,7 +285,11 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing is faulty. It should measure several times `noise_w`, W.
+/// Returns true if a relay that measures nothing should measure several times its noise `noise_w`, W. Its receiver is
+/// then faulty.
+///
+/// The repeated measurements of the other relays, whose sums are `others`, give the expected power. `there` has the
+/// terms of the relay's position.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -284,8 +304,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a power ratio differs from 1 beyond errors. `((ratio - 1 / ratio) / 2)^2` must exceed
-/// `deviations * unsure` and `least`.
+/// Returns true if a ratio of powers differs from 1 by more than measurement errors explain. ((ratio - 1 / ratio) /
+/// 2)^2 must then exceed both `deviations` times the variance `unsure`, and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -294,14 +314,15 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which a level at Tx or Rx does not fit; the larger counts. A multiple of the variance, a squared
-/// relative difference.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first is a multiple of
+/// the variance, the second a squared relative difference, here a factor of 1.5. The larger one counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
-/// Minimum number of relays to check the levels at Tx and Rx.
+/// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
+/// faulty.
 const FEWEST_FOR_ENDS: u16 = 3;
 
-/// Measured / expected level, and its relative variance.
+/// Level measured at Tx or Rx divided by the expected level, and the relative variance of this ratio.
 #[derive(Clone, Copy, Debug)]
 struct EndLevel {
     ratio: f64,
@@ -314,13 +335,16 @@ impl EndLevel {
     }
 }
 
-/// Converts a `level` at Tx or Rx to v = 1e-12 W / I.
+/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it. The conversion uses
+/// the mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Returns which levels at Tx and Rx do not fit.
+/// Compares the levels measured at Tx and Rx with the relays' measurements. Returns which of them do not fit.
+///
+/// `fit` is the source that was fitted to the relays' measurements.
 pub(super) fn judge_ends(
     mission: &Mission,
     fit: &Fit,

@@ -24,33 +24,32 @@ use crate::place::Placement;
 use crate::sensing::Listen;
 use crate::time::{Duration, Instant};
 
-/// Estimate of the interference that all relays use.
+/// Estimate of the interference that all relays of the chain use.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum InterferenceEstimate {
-    /// Interference as configured in the mission.
+    /// Interference as the mission configures it; measurements have not changed it.
     #[default]
     Mission,
-    /// Unknown interference; the relays spread in order to measure it.
+    /// Unknown interference. The relays take this spacing along the line Tx to Rx in order to measure it.
     Unknown(Spread),
-    /// Single transmitter on the ground.
+    /// Single interfering transmitter on the ground.
     Source {
-        /// Estimated position and power.
+        /// Estimated position and power of the interfering transmitter.
         source: Interferer,
-        /// Interference power measured at Rx, W; 0 if not measured.
-        ///
-        /// With 0 it is computed from the source and the path loss along the ground.
+        /// Interference power measured at the ground receiver, W. 0 if the receiver has not measured. The interference
+        /// at the receiver is then computed from the estimated source and the path loss along the ground.
         receiver_w: f32,
     },
 }
 
 impl InterferenceEstimate {
-    /// Returns `mission` with this estimate.
+    /// Returns `mission` with this interference estimate.
     ///
-    /// `own` is used for the estimate [`Mission`](Self::Mission).
+    /// `own` is the mission's own interference, for the estimate [`Mission`](Self::Mission).
     ///
     /// # Errors
-    /// [`MissionError`] if the estimate is out of range.
+    /// [`MissionError`] if the estimated interference is out of range.
     pub(crate) fn mission(
         &self,
         mission: &Mission,
@@ -72,12 +71,12 @@ impl InterferenceEstimate {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Spread {
-    /// Equal length of all hops.
+    /// Spacing with all hops of the same length.
     #[default]
     Even,
-    /// First hop, from Tx, half as long as the others.
+    /// Spacing with the first hop, from Tx, half as long as the other hops.
     TowardTx,
-    /// Last hop, to Rx, half as long as the others.
+    /// Spacing with the last hop, to Rx, half as long as the other hops.
     TowardRx,
 }
 
@@ -91,60 +90,68 @@ impl Spread {
     }
 }
 
-/// Interference estimate with its sequence number.
-///
-/// The leader increments the number, which wraps.
+/// Interference estimate with its sequence number. The leader increments the number, which wraps.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NumberedEstimate {
-    /// Sequence number, 0 for the initial estimate.
+    /// Sequence number of the estimate, 0 for the initial estimate.
     pub number: u16,
-    /// Estimate with this number.
+    /// Interference estimate that has this sequence number.
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change below which an estimate is kept.
+/// Mean square relative change of the interference below which a new estimate is not adopted.
 const WORTH: f64 = 1e-5;
 
-/// Mean square relative change that is a refinement.
+/// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
+/// can mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Change / expected change, below which a stationary source is only refined.
+/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a stationary source.
+/// Below it the new estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Change / expected change, below which a moving source is only refined.
+/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a moving source. Below
+/// it the new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Change / expected change that shows another source. It applies after [`REFINED`] refinements of a stationary source.
+/// Minimum ratio of the change of the estimate to the change by chance that shows another interferer. Both are mean
+/// square changes. It applies after [`REFINED`] refinements, for a stationary source.
 const ANOTHER: f64 = 64.0;
 
-/// Minimum squared relative change of the level at Rx.
+/// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of the track, in variances.
+/// Maximum squared deviation of the interferer's track from the fit, divided by the fit's variance. Above it the
+/// position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth of information for a refinement, a factor.
+/// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
+/// measured positions divided by the error variance of one position.
 const LEARNED: f64 = 1.1;
-/// Number of refinements before a stationary estimate stays.
+/// Number of refined estimates after which an estimate stays until the interference changes. It is for a stationary
+/// interferer.
 const REFINED: u8 = 4;
 
-/// Assumed flight time for a few metres.
+/// Time that drones are assumed to need for a few metres. A moving interferer is predicted this far ahead, plus half
+/// the interval between two sensing passes.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Mean square relative error that contradicts the source.
+/// Mean square relative error of measurements above which they contradict the estimated source. The relays then treat
+/// the interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error that contradicts the mission, in expected variances.
+/// Mean square error of measurements above which they contradict the mission's interference. It is a multiple of the
+/// variance that the operator expects. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
-/// Quality of the current estimate at its adoption, and track.
+/// Quality of the current estimate when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information: number of positions / error variance of one.
+    /// Information in the measurements: number of positions divided by the error variance of one position.
     information: f64,
-    /// Expected mean square relative error of the estimate.
+    /// Expected mean square relative error of the current estimate.
     chance: f64,
-    /// Number of estimates for the same interferer, up to [`REFINED`].
+    /// Number of estimates adopted for the same interferer, up to [`REFINED`].
     refined: u8,
     track: Track,
 }
@@ -163,11 +170,14 @@ pub(crate) struct Review {
     pub(crate) adopt: Option<InterferenceEstimate>,
     pub(crate) known: Knowledge,
     pub(crate) unfit: Option<Unfit>,
-    /// Levels at Tx and Rx that do not fit.
+    /// Result of a check: the levels measured at Tx and Rx that do not fit the relays' measurements.
     pub(crate) ends: EndsOff,
 }
 
-/// Compares the measurements with `estimate`; returns a new one, if any.
+/// Compares the measurements with the current `estimate`, and returns the estimate to adopt, if any.
+///
+/// `mission` is based on the current estimate. `sums` has the measurements of all relays, and `levels` the
+/// interference measured at Tx and at Rx. `before` is the quality that the current estimate had when it was adopted.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -263,7 +273,8 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit and its source. Clears a level that does not fit.
+/// Returns the fit to all measurements, and the source of interference by this fit. Clears a level in `levels`,
+/// measured at Tx or Rx, that does not fit.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -290,7 +301,9 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer's predicted position. `None` if it rests, or its track deviates.
+/// Returns a moving interferer at the position predicted for the time when the drones have moved. `None` if the
+/// interferer does not move, or if its track deviates too much from the fit. `heard` is the mean time of the
+/// measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -313,8 +326,8 @@ fn followed(
     None
 }
 
-/// Returns `fit` with the level at `x_m` (Tx or Rx) added. Unchanged if they disagree: the path loss over the ground
-/// differs.
+/// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added to the relays' measurements. Returns `fit`
+/// unchanged if the level does not agree with them: the path loss over the ground then differs from the mission's.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -346,7 +359,10 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at Rx, W; 0 if not measured.
+/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it.
+///
+/// It is the mean of the power measured at Rx and the power computed from `source` and the path loss, weighted by their
+/// variances. If the two differ too much, it is the measured power.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -416,16 +432,17 @@ fn without_fit(
     }
 }
 
-/// Initial standard deviation of the velocity along an axis, m/s.
+/// Initial standard deviation of the interferer's velocity along one axis, m/s.
 const SPEED: f32 = 10.0;
 
-/// Minimum squared velocity of a moving interferer, in variances.
+/// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Squared deviation that starts the track again, in variances.
+/// Squared deviation of a new position from the track that shows another interferer. It is divided by the track's
+/// variance. The track then starts again.
 const ELSEWHERE: f32 = 49.0;
 
-/// Kalman filter of one axis: position, m, velocity, m/s, covariance.
+/// Kalman filter of the interferer along one axis: position, m, velocity, m/s, and their covariance.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     at: f32,
@@ -442,7 +459,8 @@ impl Axis {
         }
     }
 
-    /// Advances by `seconds`; `walk` is in m^2/s^3.
+    /// Advances position and velocity by `seconds`. The variance of the velocity grows by `walk` per second, in
+    /// m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
         let [at, both, speed] = &mut self.variance;
@@ -451,7 +469,7 @@ impl Axis {
         *speed += walk * seconds;
     }
 
-    /// Updates with a position, m, of `variance`, m^2.
+    /// Updates position and velocity with the measured position `found`, m, of variance `variance`, m^2.
     fn take(&mut self, found: f32, variance: f32) {
         let [at, both, speed] = self.variance;
         let sum = at + variance;
@@ -486,7 +504,7 @@ impl Axis {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Track {
     axes: [Axis; 2],
-    /// Time of position and velocity; `None` before the first source.
+    /// Time to which the track's position and velocity refer; `None` before the first source is found.
     at: Option<Instant>,
 }
 
@@ -496,7 +514,8 @@ impl Track {
         at: None,
     };
 
-    /// Updates the track with a source of the mean time `at`.
+    /// Updates the interferer's track with a position found from measurements with the mean time `at`. `half_life` is
+    /// the half-life of the measurements' weight.
     pub(crate) fn update(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]
@@ -523,7 +542,8 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the last position, and that at `then`: (x, y), m. `None` if the interferer rests.
+    /// Returns the interferer's last position, and its predicted position at `then`: (x, y), m, of each. `None` if the
+    /// interferer does not move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;

@@ -1,69 +1,69 @@
 //! Source estimate: a weighted least-squares fit of the sums, and its uncertainty.
 //!
-//! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is the residual
-//! of the sums over the positions beyond the unknowns. The operator's expectation is added with a weight of four
-//! positions, as few of them leave little residual.
+//! With relative errors of variance s^2 the unknowns have the covariance s^2 G^-1, G the products. s^2 is the residual of the
+//! sums over the positions beyond the unknowns. The operator's expectation is added with a weight of four positions, as few of
+//! them leave little residual.
 //!
-//! If no source fits, the closest one is searched on a grid, and on finer ones about its optimum. The coefficients of a
-//! source at (X', Y') are k g, g = (X'^2 + Y'^2 + 1/3, -2 X', 1, -2 Y'). The best k is m g / (g G g), with m the
-//! products with v, and the residual is smallest where (m g)^2 / (g G g) is largest. So the search has two dimensions.
+//! If no source fits, the closest one is searched on a grid, and on finer ones about its optimum. The coefficients of a source at
+//! (X', Y') are k g, g = (X'^2 + Y'^2 + 1/3, -2 X', 1, -2 Y'). The best k is m g / (g G g), with m the products with v, and the
+//! residual is smallest where (m g)^2 / (g G g) is largest. So the search has two dimensions.
 //!
 //! The symmetric positive 4 x 4 system is solved by L D L^T factorisation in f64; the last unknown may be omitted.
 
 use super::sums::{Sums, Terms, coefficients, expected_v, strength, value};
 use crate::mission::{Interferer, Mission};
 
-/// Reason why the measurements give no single source.
+/// Reason why the measurements give no single source of interference.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Unfit {
-    /// The measured positions are too few or too close together.
+    /// The measured positions are too few, or too close together, to determine a source.
     Places,
-    /// No single source on the ground fits.
+    /// The measurements fit no single source on the ground.
     NoSource,
-    /// The measurements are inconsistent; the faulty one is unknown.
-    ///
-    /// This happens with four relays or fewer, with several faulty relays, or if the path loss from the interferer to
-    /// Tx or Rx differs from the mission's.
+    /// The measurements are inconsistent, and it is unknown which measurement is faulty. This happens with four relays
+    /// or fewer, with more than one faulty relay, or if the path loss between the interferer and Tx or Rx differs from
+    /// the mission's.
     Contradiction,
 }
 
-/// Weight of the expected error, in measured positions.
+/// Weight of the operator's expected error in the estimated variance: a number of measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D that tells right from left.
+/// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance the
+/// measurements do not show if the source is to the right or to the left of the line Tx to Rx.
 const SIDES: f64 = 2.5e-5;
 
-/// Source of interference estimated from measurements.
+/// Source of interference estimated from the measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FoundSource {
-    /// Estimated position and power.
+    /// Estimated position and power of the source.
     pub source: Interferer,
-    /// Variances of x and y, m^2.
+    /// Variances of the source's estimated x and y, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source.
-    ///
-    /// If false, `source` is the closest one, and `variance_m2` is 0.
+    /// True if the measurements fit a single source. If false, `source` is the closest source, and `variance_m2` is 0.
     pub is_one: bool,
 }
 
-/// Factors L D L^T of the matrix: L below, D on the diagonal.
+/// Factors L D L^T of the fit's symmetric 4 x 4 matrix: L below its diagonal, and D.
 #[derive(Clone, Copy, Debug)]
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if all four unknowns are determined. The last one tells right from left of the line Tx to Rx.
+    /// True if the fit determines all four unknowns. False if it leaves out the last one, which shows if the source is
+    /// to the right or to the left of the line Tx to Rx.
     full_rank: bool,
 }
 
-/// Minimum pivot relative to the first.
+/// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
+/// separate the unknowns of the fit.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
-    /// Factorises the matrix of `products`; `None` if singular. The last unknown is omitted unless its pivot is above
-    /// `least`.
+    /// Factorises the fit's symmetric matrix, given by ten `products` of [`Sums`]. `None` if the measured positions
+    /// cannot separate the first three unknowns. The last unknown is omitted if its pivot is not above `least`.
     fn new(products: [f64; 10], least: f64) -> Option<Self> {
         let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd] = products;
         if !(aa > 0.0) {
@@ -112,13 +112,14 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the last unknown, its inverse variance.
+    /// Pivot of the fit's last unknown. The inverse of the pivot is the variance of that unknown, if measurements have variance 1.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last
     }
 
-    /// Returns the variance of the fitted value, `r^T G^-1 r`.
+    /// Returns the variance of the fitted value at a position, for measurements of variance 1. It is r^T G^-1 r, with
+    /// the position's `terms` r and the fit's matrix G.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -127,32 +128,32 @@ impl Factor {
     }
 }
 
-/// Least-squares fit of a source: four coefficients.
+/// Least-squares fit of a source to the measurements: the four coefficients that describe the source.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     coefficients: [f64; 4],
     products: [f64; 10],
     right: [f64; 4],
     factor: Factor,
-    /// Variance of a position's relative error, estimated by the fit.
+    /// Variance of the relative error of one measured position, as estimated from the fit.
     variance: f64,
-    /// Variance of a position's relative error, set by the operator.
+    /// Expected variance of the relative error of one measured position, as set by the operator.
     expected: f64,
-    /// Residual: sum of the squared relative errors.
+    /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
-    /// Degrees of freedom: positions minus unknowns, at least 0.
+    /// Degrees of freedom: number of measured positions minus the number of unknowns. 0 if the difference is
+    /// negative.
     beyond: f64,
     count: f64,
 }
 
 impl Fit {
-    /// Fits a source to `sums`.
+    /// Fits a source to the measurements in `sums`. `relative_error` is the expected error of a measurement.
     ///
-    /// `relative_error` is the expected error of a measurement. About 6 000 instructions on a Cortex-M4F, in software
-    /// f64.
+    /// About 6 000 instructions on a Cortex-M4F, in software f64.
     ///
     /// # Errors
-    /// [`Unfit::Places`] if the positions cannot separate the first three unknowns.
+    /// [`Unfit::Places`] if the measured positions cannot separate the first three unknowns.
     pub fn of(sums: &Sums, relative_error: f32) -> Result<Self, Unfit> {
         let [products @ .., av, bv, cv, dv, vv, count, measured, _] = sums.numbers.map(f64::from);
         let [aa, ..] = products;
@@ -188,7 +189,7 @@ impl Fit {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "checked")]
-    /// Returns the most likely power there, W, 1e-6 to 1e9.
+    /// Returns the most likely power of a source at (`x_m`, `y_m`), W; `None` outside of 1e-6 to 1e9 W.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {
             power_w: mission.config().common.power_w,
@@ -203,7 +204,7 @@ impl Fit {
         (1e-6..=1e9).contains(&power_w).then_some(power_w)
     }
 
-    /// Returns the relative variance of the fitted inverse interference.
+    /// Returns the relative variance of the fitted inverse interference at a position with these `terms`.
     pub(crate) fn relative_variance(&self, terms: &Terms) -> f64 {
         let heard = self.value(terms);
         self.variance * self.factor.variance(terms.map(f64::from)) / (heard * heard)
@@ -217,42 +218,48 @@ impl Fit {
         self.expected
     }
 
-    /// Residual: sum of the squared relative errors.
+    /// Residual of the fit: the sum of the squared relative errors of all measured positions.
     pub(crate) const fn seen(&self) -> f64 {
         self.seen
     }
 
-    /// Returns true if the variance is below four times the expected one. Positions must exceed unknowns.
+    /// Returns true if the fit has more positions than unknowns, and a small variance. It must be below four times the
+    /// variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Returns the number of positions / error variance of one.
+    /// Returns the information in the measurements.
+    ///
+    /// It is the number of positions divided by the variance of one position's error.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }
 
-    /// Returns the mean square relative difference of two sources.
+    /// Returns the mean square relative difference of two sources' interference at the measured positions. Each source
+    /// is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_difference(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference to another source.
+    /// Returns the mean square relative difference in interference between the fit and another source. It is the mean
+    /// over the measured positions. The source is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)
     }
 
-    /// Returns the expected mean square relative error.
+    /// Returns the expected mean square relative error of the fitted interference.
     pub(crate) fn chance(&self) -> f64 {
         let unknowns = if self.factor.full_rank { 4.0 } else { 3.0 };
         unknowns * self.variance / self.count
     }
 
-    /// Returns the source that fits, or else the closest one.
+    /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// If the positions do not tell the sign of the source's y, it is that of `side_m`, relative to their mean y.
+    /// The measured positions may not determine if the source's y is above or below their mean y. It is then on the
+    /// side of `side_m`, a lateral offset y.
     ///
     /// # Errors
     /// [`Unfit::NoSource`] if no source on the ground fits.
@@ -315,7 +322,8 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative error for a source.
+/// Returns the mean square relative error of the measurements if a source had these `coefficients`. `sums` are the sums
+/// of the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [products @ .., av, bv, cv, dv, vv, count, _, _] = sums.numbers.map(f64::from);
     let [a, b, c, d] = *coefficients;
@@ -331,7 +339,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function from terms to v = 1e-12 W / I.
+/// Returns a function that converts the terms of a position to v = 1e-12 W / I there. I is the interference power of
+/// the mission's interferer. The function gives `None` without a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -339,19 +348,25 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the search, in half Tx-Rx distances.
+/// Half width of the square searched for a source, in units of D / 2; D is the distance from Tx to Rx. The square
+/// reaches from D before Tx to D beyond Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
-/// Steps from middle to edge of the first grid.
+/// Number of grid steps from the middle to the edge of the first grid of the search for a source.
 const COARSE: i8 = 8;
 
-/// Steps from middle to edge of finer grids.
+/// Number of grid steps from the middle to the edge of each finer grid of the search for a source.
 const FINE: i8 = 2;
 
-/// Number of finer grids, each with 0.4 times the step.
+/// Number of finer grids in the search for a source. The steps of each grid are 0.4 times the steps of the previous
+/// grid.
 const FINER: u8 = 5;
 
-/// Returns X', Y' and k of the best source on grids, if any. `sign` selects Y' above or below `side`.
+/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. They are searched on
+/// grids. Positions are in units of half the distance from Tx to Rx.
+///
+/// The search covers Y' above `side`, the mean Y' of the measured positions, if `sign` is 1, and Y' below it if `sign`
+/// is -1. It tries 414 positions, in some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],
@@ -415,7 +430,7 @@ impl Best<'_> {
 mod tests {
     use super::Factor;
 
-    /// Matrix of four positions with linearly independent rows.
+    /// Symmetric matrix of the fit for four positions that differ in all terms. Its rows are linearly independent.
     const MATRIX: [[f64; 4]; 4] = [
         [4.0, 0.6, 1.1, -0.7],
         [0.6, 3.0, -0.4, 0.9],
@@ -433,7 +448,7 @@ mod tests {
         MATRIX.map(|row| row.iter().zip(x).map(|(a, b)| a * b).sum())
     }
 
-    /// Checks the factorisation's solution, and the variance `r^T G^-1 r`.
+    /// Checks that the factorisation solves the fit's equations, and that the variance is r^T G^-1 r.
     #[test]
     fn the_equations_of_the_fit_are_solved() {
         let factor = factor(0.0);
@@ -448,7 +463,7 @@ mod tests {
         }
     }
 
-    /// Checks that the last unknown is 0 for a too small pivot.
+    /// Checks that the last unknown is 0 if its pivot is too small. The other unknowns then solve their equations.
     #[test]
     fn an_unknown_that_is_not_seen_is_left_out() {
         let factor = factor(10.0);

@@ -10,27 +10,27 @@ use crate::root::sqrt;
 use crate::sir::square;
 use crate::time::{Duration, Instant};
 
-/// Range of measurable interference power, W, without noise.
+/// Range of measurable interference power, W, without the receiver's noise.
 ///
-/// Powers outside are rejected. Inside, squares of values and of ratios are finite in the units of
-/// [`sensing`](crate::sensing).
+/// Powers outside of the range are rejected. Within the range, the square of a value is finite in the units of
+/// [`sensing`](crate::sensing), and so is the square of the ratio of two values.
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
-/// Mean interference power measured at Tx or Rx.
+/// Mean interference power that was measured at Tx or at Rx, and the number of its measurements.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Level {
-    /// Mean interference power, W; 0 without a measurement.
+    /// Mean interference power at this ground station, W; 0 without a measurement.
     pub power_w: f32,
-    /// Number of measurements; older ones count less.
+    /// Number of measurements in the mean. Older measurements count less.
     pub count: f32,
 }
 
-/// Levels of Tx and Rx that do not fit.
+/// Flags for the levels measured at Tx and Rx: true if a level does not fit the relays' measurements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// True if it is unknown whether Tx or Rx is faulty.
+    /// True if the measurements of Tx and Rx contradict each other, and it is unknown which is faulty.
     pub(crate) unknown: bool,
 }
 
@@ -42,7 +42,8 @@ impl EndsOff {
     };
 }
 
-/// Levels measured at Tx and Rx, and their last check.
+/// Interference levels measured at Tx and Rx, and the result of their last check. The check compares them with the
+/// relays' measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
     pub(crate) transmitter: Level,
@@ -60,34 +61,36 @@ impl Level {
     }
 }
 
-/// Returns true for a valid level, W, or 0.
+/// Returns true if `power_w` is a valid interference level, W, or 0, which stands for no measurement.
 pub(crate) fn is_power(power_w: f32) -> bool {
     power_w.to_bits() == 0 || is_level(power_w)
 }
 
-/// Returns true if `power_w` is in [`MEASURED_W`].
+/// Returns true if `power_w` is within the measurable range of interference power, [`MEASURED_W`].
 pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Four terms of a position; 1 / I is linear in them. 1, u, `u^2 - 1/3 + t^2 + z^2` and t; `u = 2 x / D - 1`,
-/// `t = 2 y / D`, `z = 2 h / D`.
+/// Four terms of a position. The inverse interference of a source is a linear combination of them. They are 1, u, u^2 -
+/// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
-/// Returns the four terms of the position `at`.
+/// Returns the four terms of the position `at`. A source's inverse interference there is a linear combination of
+/// them. `distance_m` is the distance from Tx to Rx.
 pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     let half = 0.5 * distance_m;
     let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Unit of power, W: v = 1e-12 W / I. An f32 holds v squared.
+/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. The unit is in the middle of the measurable
+/// range, so that an f32 holds the square of v.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
-/// Range of v for [`MEASURED_W`].
+/// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
 const V: (f32, f32) = (1e-18, 1e18);
 
-/// Converts v to f32; `None` outside the measurable range.
+/// Converts an expected v = 1e-12 W / I (I is the interference power) to f32. `None` outside of the measurable range.
 pub(crate) fn expected_v(v: f64) -> Option<f32> {
     let (least, most) = (f64::from(V.0), f64::from(V.1));
     #[expect(
@@ -97,15 +100,17 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Converts power to strength, `k = eta D^2 UNIT_W / (4 P)`, or back.
+/// Converts a source's power to its strength k = eta D^2 [`UNIT_W`] / (4 P), and a strength to a power. P is `power_w`,
+/// in W, eta the mission's path-loss factor to the ground, and D its distance from Tx to Rx.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
     0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
-/// Returns the coefficients of `source`: `k (X'^2 + Y'^2 + 1/3)`, `-2 k X'`, k, `-2 k Y'`. X' and Y' are in half Tx-Rx
-/// distances; k is the [`strength`].
+/// Returns the four coefficients of `source`, which turn a position's terms into v = 1e-12 W / I. They are k (X'^2 +
+/// Y'^2 + 1/3), -2 k X', k and -2 k Y'. X' and Y' are the position in units of half the distance from Tx to Rx, and k
+/// is the [`strength`].
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -128,24 +133,24 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Number of sums that a collection of measurements has.
-///
-/// Products of terms, terms times v, v squared, numbers of positions and measurements, age.
+/// Number of sums that a sensing pass collects. They are products of terms, terms times v, v squared, number of
+/// positions, number of measurements, and age.
 pub const SUMS: usize = 18;
 
-/// Weighted sums of measurements, for the estimate of the interferer.
+/// Weighted sums over the measured positions, from which the interferer is estimated.
 ///
-/// Per position: w a b for every two of the four terms a and b, w a v for each term, w v^2, the share, the number of
-/// measurements, and share times age in s. The share of a new position is 1, and fades. The weight w is 2 (v / e)^(1/2)
-/// / (v^2 + e^2), with the measured v and the expected e. It is 1 / e^2 if both agree. Errors equal in decibels have
-/// equal weights. No position outweighs all others.
+/// The sums for each position: w a b for every two of the four terms a and b, w a v for each term, w v^2, the
+/// position's share, its number of measurements, and its share times its age in seconds. The share is 1 for a new
+/// position and fades. The weight w is 2 (v / e)^(1/2) / (v^2 + e^2), with the measured v and the expected value e of
+/// v. It is 1 / e^2 if both agree. Errors that are equal in decibels have equal weights, and no position has more
+/// weight than all the others.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sums {
     pub(crate) numbers: [f32; SUMS],
 }
 
-/// Limit of each sum, which keeps it finite.
+/// Limit of each sum of measurements, which keeps it finite.
 const MOST: f32 = 1e38;
 
 fn within(sum: f32) -> f32 {
@@ -153,13 +158,14 @@ fn within(sum: f32) -> f32 {
 }
 
 impl Sums {
-    /// Sums before any measurement: all zero.
+    /// Sums before any measurement: all of them are zero.
     pub const NONE: Self = Self {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a position, with measured `v` and `expected` v above 0. `share` multiplies its weight. At most 60
-    /// instructions.
+    /// Adds a measured position with its `terms`, the measured `v`, and the `expected` v, both above 0. v is 1e-12 W /
+    /// I. The position's weight follows from both v, and is multiplied by `share`. `measured` is the number of
+    /// measurements there. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
@@ -195,7 +201,7 @@ impl Sums {
         }
     }
 
-    /// Multiplies all weights by `share`; adds `seconds` to ages.
+    /// Multiplies the weight of all measurements in the sums by `share`, and adds `seconds` to their age.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
         *age += *count * seconds;
@@ -204,13 +210,13 @@ impl Sums {
         }
     }
 
-    /// Returns the number of measured positions; older ones count less.
+    /// Returns the number of measured positions in the sums. Older positions count less.
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count
     }
 
-    /// Returns the mean number of measurements per position.
+    /// Returns the mean number of measurements per measured position.
     pub(crate) fn measured(&self) -> f32 {
         let [.., count, measured, _] = self.numbers;
         if count > 0.0 { measured / count } else { 0.0 }
@@ -221,7 +227,7 @@ impl Sums {
         weight
     }
 
-    /// Returns the mean age of the measurements, s.
+    /// Returns the mean age of the measurements in the sums, s.
     pub fn age_s(&self) -> f32 {
         let [.., count, _, age] = self.numbers;
         if count > 0.0 { age / count } else { 0.0 }
@@ -236,7 +242,7 @@ impl Sums {
         (self.age_s() * 1e6) as u64
     }
 
-    /// Returns true if a relay can have sent these sums.
+    /// Returns true if a relay can have sent these sums. All are finite, and sums of squares are not negative.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())
@@ -246,22 +252,22 @@ impl Sums {
     }
 }
 
-/// Minimum distance of different positions, as a fraction of the Tx-Rx distance.
+/// Minimum distance between two positions that count as different. It is a fraction of the distance from Tx to Rx.
 const APART: f32 = 1.0 / 200.0;
 
-/// Measurements of one relay: the mean here, and earlier sums.
+/// Measurements of one relay: the mean at its position, and the sums of earlier positions. 120 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Listener {
     half_life: Duration,
     past: Sums,
     faded: Instant,
-    /// Mean position since the last move.
+    /// Mean of the positions at which the relay measured since it last moved.
     at: Placement,
-    /// Mean interference here, in units of `UNIT_W`.
+    /// Mean interference measured at the relay's current position, in units of `UNIT_W`.
     heard: Average,
 }
 
-/// Terms of the position, and v = 1e-12 W / I there.
+/// Terms of a relay's current position for the fit, and v = 1e-12 W / I measured there. I is the interference power.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,
@@ -283,7 +289,9 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measurement; `heard` is above 0, in [`UNIT_W`].
+    /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units of
+    /// [`UNIT_W`]. `expected` returns 1e-12 W / I for the terms of a position by the current estimate, as needed for
+    /// the weights.
     pub(crate) fn add(
         &mut self,
         now: Instant,
@@ -315,7 +323,8 @@ impl Listener {
         })
     }
 
-    /// Returns all sums with weights and ages at `now`.
+    /// Returns the sums of all measurements, with weights and ages as of `now`. `expected` returns v = 1e-12 W / I by
+    /// the current estimate for the terms of a position.
     pub(crate) fn sums(
         &self,
         now: Instant,
@@ -340,25 +349,25 @@ impl Listener {
         sums.fade(left(age, self.half_life), seconds);
     }
 
-    /// Discards the sums of earlier positions.
+    /// Discards the sums of measurements at earlier positions.
     pub(crate) const fn forget_past(&mut self) {
         self.past = Sums::NONE;
     }
 }
 
-/// Returns the weight that remains at `age`, 1 to 0.
+/// Returns the fraction of a measurement's weight, 1 to 0, that remains at the age `age`.
 pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
     libm::exp2f(-(age.as_micros() as f32 / half_life.as_micros() as f32))
 }
 
-/// Mean of measurements whose weight halves in each half-life.
+/// Exponentially weighted mean of measurements, whose weight halves in each half-life.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Average {
-    /// Weighted mean; 0 without a value.
+    /// Weighted mean of the measured values; 0 without any.
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,
-    /// Mean age at `last`, s, weighted alike.
+    /// Mean age of the measurements as of the time `last`, s, weighted like the mean.
     pub(crate) behind_s: f32,
 }
 
@@ -388,7 +397,8 @@ mod tests {
     use crate::mission::{Interferer, Mission};
     use crate::place::Placement;
 
-    /// Checks the coefficients against the channel model `P / (eta l^2)`.
+    /// Checks that a source's coefficients give the inverse interference of the channel model. The
+    /// interference is P / (eta l^2) for a source of P watts at the distance l.
     #[test]
     fn coefficients_are_those_of_the_channel_model() {
         let mission = Mission::try_new(paper(3)).unwrap();

@@ -1,33 +1,32 @@
 //! Authentication of frames: the tag, and replay protection by counters.
 //!
-//! The tag is keyed BLAKE2s (RFC 7693) over the nonces of both ends, the header and the body, with a digest of eight
-//! bytes. We use a MAC and not a cipher, because anyone who sees the drones knows their positions. A MAC also remains
-//! secure if a counter is used twice; a stream cipher does not.
+//! The tag is keyed BLAKE2s (RFC 7693) over the nonces of both ends, the header and the body, with a digest of eight bytes. We
+//! use a MAC and not a cipher, because anyone who sees the drones knows their positions, and because a MAC remains secure even if
+//! a counter is used twice, which a stream cipher does not.
 
 use super::blake2s::mac;
 use crate::features::AUTH;
 
-/// Length of an authentication tag, bytes.
+/// Length of the authentication tag at the end of a signed frame, bytes.
 pub const TAG: usize = 8;
 
-/// Length reserved for a tag, bytes.
+/// Number of bytes reserved in a frame for an authentication tag; 0 without the feature `auth`.
 pub(crate) const TAG_ROOM: usize = if AUTH { TAG } else { 0 };
 
-/// Secret key that all nodes of a network share.
+/// Secret key that the nodes of a network share, for the authentication of frames.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// Creates a key from `bytes`, 256 random bits.
-    ///
-    /// Do not use a password.
+    /// Creates a key from `bytes`, 256 random bits. Do not use a password.
     pub const fn new(bytes: [u8; 32]) -> Self {
         Self(bytes)
     }
 
-    /// Returns the authentication tag of `signed`, a frame's header and body.
+    /// Returns the authentication tag of `signed`, the header and body of a frame. `sender` and `receiver` are the
+    /// nonces of the frame's sender and receiver.
     ///
-    /// `sender` and `receiver` are the nonces of both nodes. Work: two to five blocks of BLAKE2s.
+    /// Work: two to five blocks of BLAKE2s.
     pub fn tag(&self, sender: u64, receiver: u64, signed: &[u8]) -> [u8; TAG] {
         let both = u128::from(receiver) << 64 | u128::from(sender);
         mac(&self.0, &both.to_le_bytes(), signed)
@@ -35,7 +34,7 @@ impl Key {
 }
 
 impl core::fmt::Debug for Key {
-    /// Formats the key without its bytes: never in logs.
+    /// Formats the key without its bytes, since keys must not appear in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Key(..)")
     }
@@ -62,12 +61,11 @@ impl defmt::Format for Key {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Auth {
-    /// Secret key of the network.
+    /// Secret key that authenticates the frames of the network.
     pub key: Key,
-    /// Start counter of this relay, from 1, larger at every start.
-    ///
-    /// Use a number in flash, incremented before use, or the seconds of a clock that never runs backward. With a reused
-    /// epoch, frames recorded in it are accepted again.
+    /// Start counter of this relay, from 1, larger at every start. Use a number in flash that is incremented before
+    /// use, or the seconds of a clock that never runs backward. With a reused epoch, frames recorded in it are accepted
+    /// again.
     pub epoch: u32,
 }
 
@@ -78,9 +76,8 @@ impl Auth {
     }
 }
 
-/// Credentials of a relay; uninhabited without the feature `auth`.
-///
-/// The compiler then drops all code that signs.
+/// Credentials of a relay. The type is uninhabited without the feature `auth`, so that the compiler drops all code
+/// that signs.
 #[cfg(not(feature = "auth"))]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -93,11 +90,12 @@ impl Auth {
     }
 }
 
-/// Nonces of both ends: epoch above, counting number below.
+/// Nonces of a frame's sender and receiver. The upper half of a nonce is the node's epoch (start counter); the lower
+/// half counts up from a random number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
-    /// Nonce of the receiver; 0 if unknown.
+    /// Nonce of the receiver; 0 in a handshake whose sender does not know it yet.
     pub(crate) receiver: u64,
 }
 
@@ -110,7 +108,7 @@ impl Nonces {
     }
 }
 
-/// Key and nonces for frames to one node.
+/// Key and nonces of one node for authenticating its frames to another.
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
     pub(crate) key: &'a Key,
@@ -124,23 +122,25 @@ impl Signer<'_> {
     }
 }
 
-/// Returns true if two tags are equal, in constant time.
+/// Returns true if two authentication tags are equal, in constant time.
 pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Replay protection for one sender: the newest 64 counters.
+/// Replay protection for one sender: the frame counters that were accepted. It has the newest accepted frame counter,
+/// and a flag for each of the 63 counters below it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
-    /// Largest accepted frame counter plus one; 0 before the first.
+    /// Largest accepted frame counter of the sender, plus one; 0 if none was accepted.
     next: u32,
-    /// Accepted counters: bit i stands for `next - 1 - i`.
+    /// Accepted frame counters, as bits: bit i stands for `next` - 1 - i.
     taken: u64,
 }
 
 impl Window {
-    /// Accepts `counter` once; false if repeated, old, or `u32::MAX`.
+    /// Accepts a frame's `counter` once. Returns false if the counter was accepted before, is below the window, or is
+    /// `u32::MAX`.
     pub(crate) const fn accept(&mut self, counter: u32) -> bool {
         let Some(next) = counter.checked_add(1) else {
             return false;

@@ -1,15 +1,14 @@
 //! Keyed BLAKE2s (RFC 7693), for tags of eight bytes.
 //!
-//! Implemented here because the available crates leave a panic in the image, or take more flash than `auth` may. In
-//! `blake2` 0.11 an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too.
-//! With `size_opt` and `opt-level = 3` it takes 1.6 KB more, and 11 100 instead of 12 800 instructions for the tag of a
-//! full sweep; without `size_opt` 3.7 KB more and 4800 instructions. `hmac-sha256` indexes by tables too, and `hmac`
-//! with `sha2` takes several times the flash. The tests compare this implementation with `blake2`. No branch or address
-//! depends on key or message.
+//! Implemented here because the available crates leave a panic in the image, or take more flash than `auth` may. In `blake2` 0.11
+//! an `expect` in `block-buffer` stays reachable, and with `size_opt` bounds checks of its tables too. With `size_opt` and
+//! `opt-level = 3` it takes 1.6 KB more, and 11 100 instead of 12 800 instructions for the tag of a full sweep; without
+//! `size_opt` 3.7 KB more and 4800 instructions. `hmac-sha256` indexes by tables too, and `hmac` with `sha2` takes several times
+//! the flash. The tests compare this implementation with `blake2`. No branch or address depends on key or message.
 
 const BLOCK: usize = 64;
 
-/// Initial state of BLAKE2s (RFC 7693).
+/// Initial state of BLAKE2s: 32 fractional bits of the square roots of the first eight primes.
 const START: [u32; 8] = [
     0x6A09_E667,
     0xBB67_AE85,
@@ -21,7 +20,8 @@ const START: [u32; 8] = [
     0x5BE0_CD19,
 ];
 
-/// Order of message words (RFC 7693): columns, then diagonals.
+/// Indices of the 16 message words that each of the ten rounds of BLAKE2s uses (RFC 7693). The first eight are for
+/// the columns, the others for the diagonals.
 const ORDER: [[[u8; 8]; 2]; 10] = [
     [[0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15]],
     [[14, 10, 4, 8, 9, 15, 13, 6], [1, 12, 0, 2, 11, 7, 5, 3]],
@@ -35,7 +35,8 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
     [[10, 2, 8, 4, 7, 6, 1, 5], [15, 11, 9, 14, 3, 12, 13, 0]],
 ];
 
-/// Returns the keyed digest of both parts, under 2^32 bytes.
+/// Returns the eight-byte keyed BLAKE2s digest of `first` followed by `second`. Together they have fewer than 2^32
+/// bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;
@@ -63,7 +64,8 @@ pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     (u64::from(high) << 32 | u64::from(low)).to_le_bytes()
 }
 
-/// Compresses one block; `count` is the bytes so far, with it.
+/// Compresses one block into the state; `count` is the number of bytes so far, including this block. `last` is true
+/// for the last block.
 #[inline(never)]
 fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     let mut words = [0; 16];
@@ -98,7 +100,7 @@ fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     }
 }
 
-/// Applies the function G (RFC 7693) to four columns.
+/// Applies the function G of RFC 7693 to four columns, with two message words for each.
 #[inline(never)]
 fn mix(rows: &mut [[u32; 4]; 4], words: &[u32; 16], order: [u8; 8]) {
     let [a, b, c, d] = rows;
@@ -117,7 +119,7 @@ fn mix(rows: &mut [[u32; 4]; 4], words: &[u32; 16], order: [u8; 8]) {
     }
 }
 
-/// Rotates the rows: the diagonals become columns for [`mix`].
+/// Rotates the rows of the state, a 4 x 4 matrix, so that its diagonals become columns for [`mix`].
 fn turn([_, b, c, d]: &mut [[u32; 4]; 4]) {
     *b = [b[1], b[2], b[3], b[0]];
     *c = [c[2], c[3], c[0], c[1]];
@@ -137,7 +139,8 @@ mod tests {
     use blake2::digest::consts::U8;
     use blake2::digest::{FixedOutput, Mac};
 
-    /// Checks the digests against the crate `blake2`.
+    /// Checks that this implementation and the crate `blake2` return the same digests. The inputs have up to 299
+    /// bytes, split at any point.
     #[test]
     fn the_hash_equals_the_published_one() {
         let mut state = 1_u32;

@@ -4,18 +4,18 @@
 //! that is too long, or whose COBS is invalid, everything up to the next delimiter is ignored. So the tail of such a
 //! frame is not taken for a frame.
 //!
-//! Implemented here for speed and size. With the streaming decoder of `cobs` 0.5.1 a full sweep takes 5.6 % more
-//! instructions, and the image 64 to 288 bytes more flash.
+//! Implemented here because with the streaming decoder of `cobs` 0.5.1 a full sweep takes 5.6 % more instructions, and the image
+//! 64 to 288 bytes more flash.
 
 use super::frame::MAX_DECODED;
 
-/// Reason why bytes between two delimiters are no frame.
+/// Reason why the bytes between two delimiters are no frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// Frame longer than the maximum.
+    /// The received frame is longer than the maximum.
     Oversized,
-    /// Delimiter inside a COBS block: the frame's end is missing.
+    /// A delimiter came inside a COBS block: the end of the frame is missing.
     Truncated,
 }
 
@@ -24,20 +24,20 @@ error_texts!(DeframeError {
     Truncated => "the frame ended inside a COBS block",
 });
 
-/// Decoder that splits a byte stream into frames.
+/// Decoder that splits a byte stream into frames and undoes their COBS encoding.
 #[derive(Clone, Debug)]
 pub struct Deframer {
     plain: [u8; MAX_DECODED],
     len: usize,
-    /// Remaining bytes of the COBS block; 0 before a code.
+    /// Remaining bytes of the current COBS block; 0 if a code byte is next.
     run: u8,
-    /// True to insert a zero after this COBS block, unless last.
+    /// True if the decoder has to insert a zero after the current COBS block. At the end of the frame no zero is inserted.
     zero_after: bool,
     oversized: bool,
 }
 
 impl Deframer {
-    /// Creates a decoder before the first byte of a frame.
+    /// Creates a decoder that expects the first byte of a frame.
     pub const fn new() -> Self {
         Self {
             plain: [0; MAX_DECODED],
@@ -48,10 +48,12 @@ impl Deframer {
         }
     }
 
-    /// Decodes one byte; at a delimiter returns the frame or an error.
+    /// Decodes one byte; at a delimiter returns the frame or an error. Constant work.
+    ///
+    /// Consecutive delimiters are neither frames nor errors.
     ///
     /// # Errors
-    /// [`DeframeError`], once, at the end of an invalid frame.
+    /// [`DeframeError`], once, at the delimiter that ends the invalid frame.
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], DeframeError>> {
         if byte == 0 {
             return self.delimiter();
@@ -69,8 +71,9 @@ impl Deframer {
         None
     }
 
-    /// Decodes bytes up to a block's end; returns the rest. Like [`push`](Self::push), in a quarter of the
-    /// instructions.
+    /// Decodes bytes up to the end of the current COBS block or a delimiter; returns the remaining bytes.
+    ///
+    /// Same effect as [`push`](Self::push) for each decoded byte, in a quarter of the instructions.
     pub fn push_run<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
         let free = self.plain.get_mut(self.len..).unwrap_or_default();
         let mut stored: u8 = 0;

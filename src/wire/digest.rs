@@ -7,16 +7,17 @@ use crate::features::{ALTITUDE, REVERSE};
 use crate::geodetic::Sites;
 use crate::mission::{Interference, Mission, MissionConfig};
 
-/// Returns half a CRC-32C over `mission`, in the order of `FORMAT.md`. It detects mistakes, not attacks.
+/// Returns the low half of a CRC-32C over every parameter of `mission`, in the order of `FORMAT.md`.
+///
+/// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
 pub fn digest(mission: &Mission) -> u16 {
     of(mission.config())
 }
 
 impl Mission {
-    /// Returns the 16-bit digest of all parameters.
+    /// Returns the 16-bit digest of all parameters. Relays detect by it that their missions differ.
     ///
-    /// Relays detect by it that their missions differ. It detects mistakes, not attacks: two different missions have
-    /// equal digests with a probability of 1 in 65 536.
+    /// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
     pub fn digest(&self) -> u16 {
         digest(self)
     }
@@ -79,7 +80,8 @@ fn add(crc: &mut Digest<'_, u32, Table<1>>, bytes: &[u8]) {
     crc.update(bytes);
 }
 
-/// Returns `digest` combined with uploaded positions, if any.
+/// Returns `digest` combined with `sites`, the Tx and Rx positions of an uploaded mission. With `None` the result is
+/// `digest`.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();
@@ -93,16 +95,14 @@ const fn low_half(crc: u32) -> u16 {
     u16::from_le_bytes([a, b])
 }
 
-/// Identifier of a mission, uploaded or loaded before flight.
+/// Identifier of a mission: of an uploaded one, or of the mission loaded before flight.
 ///
-/// Ordered by version, then by digest: the larger one is newer.
+/// Ordered by version; of two missions with the same version, the one with the larger digest counts as newer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionId {
-    /// Version of an upload, from 1; 0 for the mission loaded before flight.
+    /// Version that the operator gave to an upload, from 1; 0 for the mission loaded before flight.
     pub version: u16,
-    /// Digest of the mission with all configured relays.
-    ///
-    /// It does not depend on the current view.
+    /// Digest of the mission with all relays that it configures, not only those in the current view.
     pub digest: u16,
 }

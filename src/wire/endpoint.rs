@@ -11,7 +11,7 @@ use crate::features::AUTH;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 
-/// Encoded frame: its destination and length.
+/// Frame that is ready to send: its destination and its length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
     pub(crate) to: u16,
@@ -19,18 +19,18 @@ pub(crate) struct Sent {
     pub(crate) len: usize,
 }
 
-/// Endpoint of a node: checks received frames, signs sent ones.
+/// Endpoint of one node: checks received frames; addresses, numbers and signs sent frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
     network: u16,
     node: u16,
     counter: u32,
-    /// Sessions with other nodes, if this node signs.
+    /// Authentication sessions with other nodes, if this node signs. The array is empty without the feature `auth`.
     session: [Option<Session>; AUTH as usize],
 }
 
 impl Endpoint {
-    /// Creates the endpoint of node `node` without signing.
+    /// Creates the endpoint of node `node` in the network `network`. It does not sign frames.
     pub(crate) fn new(network: u16, node: u16) -> Self {
         Self {
             network,
@@ -40,15 +40,17 @@ impl Endpoint {
         }
     }
 
-    /// Signs all frames from now on. Nonces count up from the random `claim`. After `gone_after` another node can take
-    /// a session.
+    /// Signs all frames from now on with the key and epoch in `auth`. This node's nonces count up from `claim`, a
+    /// random number drawn at start. If a node is silent for `gone_after`, another node with its number can take its
+    /// session.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
         }
     }
 
-    /// Parses a frame; counts and drops damaged or foreign ones.
+    /// Parses a frame that the deframer has decoded. Returns the frame if it is intact and of this network. Any other
+    /// frame is counted in `stats` and dropped.
     pub(crate) fn open<'a>(
         &self,
         decoded: Result<&'a [u8], DeframeError>,
@@ -67,7 +69,8 @@ impl Endpoint {
         None
     }
 
-    /// Checks the tag of `frame`; `None` without authentication.
+    /// Checks the authentication tag of `frame`; `None` if this node does not use authentication. Counts every result
+    /// but a valid new message in `stats`.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -86,12 +89,14 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once all frame counters are used. Counters are never reused: restart with a new epoch.
+    /// Returns true once a signing node has used all frame counters. It must not send before it restarts with a new
+    /// epoch, because a counter must not be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Encodes `message`, or a handshake that must come first.
+    /// Encodes `message` to node `to` into `frame`. If node `to` cannot verify this node's tags yet, a handshake is
+    /// written instead, and the caller sends the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,
@@ -111,7 +116,7 @@ impl Endpoint {
         Some(self.sent(to, len, stats))
     }
 
-    /// Writes the next pending handshake; `None` if there is none.
+    /// Writes the next pending handshake into `frame`; `None` if no handshake is pending.
     #[inline(never)] // called from two places
     pub(crate) fn transmit_handshake(
         &mut self,
@@ -142,7 +147,7 @@ impl Endpoint {
         Sent { to, len }
     }
 
-    /// Returns the sessions; `None` if this node does not sign.
+    /// Returns the authentication sessions with other nodes; `None` if this node does not sign.
     pub(crate) const fn session(&self) -> Option<&Session> {
         match self.session.first() {
             Some(session) => session.as_ref(),
@@ -157,14 +162,15 @@ impl Endpoint {
         }
     }
 
-    /// Schedules a handshake to node `to`.
+    /// Schedules an authentication handshake to node `to`. Both nodes then learn each other's nonce.
     pub(crate) fn greet(&mut self, to: u16) {
         if let Some(session) = self.session_mut() {
             session.greet(to);
         }
     }
 
-    /// Returns true if node `to` can check this node's tags.
+    /// Returns true if node `to` can check this node's authentication tags. Without authentication it always returns
+    /// false.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.session().is_some_and(|session| session.knows(to))
     }

@@ -6,10 +6,10 @@ use super::message::{MAX_BODY, Message, MessageError};
 pub use super::{MAX_NODE, MAX_SWEEP};
 use crate::features::AUTH;
 
-/// Version of the format, in a frame's top four bits.
+/// Version of the frame format, in the top four bits of a frame's first 16-bit word.
 pub const VERSION: u8 = 1;
 
-/// Length of a header, bytes.
+/// Length of a frame's header, bytes.
 pub const HEADER: usize = 10;
 
 const CHECK: usize = 4;
@@ -17,31 +17,30 @@ const CHECK: usize = 4;
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
-/// Maximum length of a frame on the wire, bytes.
-///
-/// COBS adds one byte below 254 bytes, the delimiter another.
+/// Maximum length of a frame on the wire, bytes. COBS adds one byte below 254 bytes, and the delimiter is another
+/// byte.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
-/// Header flag: a tag follows the body.
+/// Header flag: an authentication tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Header flag: the body is a handshake, valid with a tag.
+/// Header flag: the body is an authentication handshake. It is valid with a tag only.
 const HANDSHAKE: u16 = 0x2000;
 
-/// Buffer for one encoded frame.
+/// Buffer for one encoded frame, of the maximum length.
 pub type FrameBuf = [u8; MAX_FRAME];
 
-/// Header of a frame: network, sender, destination, counter.
+/// Header of a frame: numbers of the network, the sender, the destination and the frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Number of the network, which separates chains.
+    /// Number of the network, which separates chains that receive each other.
     pub network: u16,
-    /// Node number of the sender: 0 Tx, 1 to N relays, N + 1 Rx.
+    /// Node number of the sender: 0 is Tx, 1 to N the relays, N + 1 Rx.
     pub sender: u16,
-    /// Node number of the destination.
+    /// Node number of the frame's destination.
     pub destination: u16,
-    /// Number of earlier frames of the sender, wrapping.
+    /// Number of frames that the sender sent before this frame, wrapping.
     pub counter: u32,
 }
 
@@ -50,13 +49,13 @@ pub struct Header {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FrameError {
-    /// Frame too short for a header and a CRC.
+    /// The frame is too short for a header and a CRC.
     Short,
-    /// CRC that does not match.
+    /// The CRC at the end of the frame does not match.
     Crc,
-    /// Frame with another version or unknown flags.
+    /// The frame has another version of the format, or unknown flags.
     Version,
-    /// Frame with an invalid message.
+    /// The message in the frame's body is invalid.
     Message(MessageError),
 }
 
@@ -73,7 +72,9 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Encodes `message`; returns the length, 0 for an invalid address. Work linear in the length.
+/// Encodes `message` into `out`. Returns the length including the delimiter, or 0 if a node number is too large.
+///
+/// Work linear in the length of the frame, at most [`MAX_FRAME`] bytes.
 pub fn encode(header: Header, message: &Message, out: &mut FrameBuf) -> usize {
     let len = body(out).and_then(|body| message.encode(body));
     close(header, 0, len, None, out)
@@ -103,12 +104,13 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of `out` for the body.
+/// Returns the part of the buffer `out` for a frame's body. It begins after the COBS code byte and the header.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
 
-/// Completes a frame; returns its length. 0 if `body` is `None` or an address is too large.
+/// Completes a frame around its body of `body` bytes: header, tag, CRC, COBS. Returns the frame's length, or 0 if
+/// `body` is `None` or an address is too large.
 fn close(
     header: Header,
     flags: u16,
@@ -141,7 +143,7 @@ fn close(
     stuff(out, len)
 }
 
-/// Writes `bytes` at the offset `at`; returns their end.
+/// Writes `bytes` into `plain` at the offset `at`, and returns the offset of their end.
 fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
     if let Some(place) = plain.get_mut(at..at + N) {
         place.copy_from_slice(&bytes);
@@ -152,24 +154,24 @@ fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
 /// Parsed intact frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Opened<'a> {
-    /// Header: addresses and counter.
+    /// Header of the frame: addresses and counter.
     pub header: Header,
-    /// Message or handshake.
+    /// Body of the frame: a message, or an authentication handshake.
     pub body: &'a [u8],
-    /// Header and body, which the tag covers.
+    /// Bytes that the authentication tag covers: header and body.
     pub signed: &'a [u8],
-    /// Tag, not verified; `None` without one.
+    /// Authentication tag, not verified; `None` for a frame without a tag.
     pub tag: Option<[u8; TAG]>,
-    /// True if the body is a handshake.
+    /// True if the body is an authentication handshake and not a message.
     pub handshake: bool,
 }
 
-/// Parses `plain`, a frame without COBS and delimiter.
+/// Parses `plain`, a frame without COBS and delimiter. The function checks the CRC, but neither the tag nor the body.
 ///
-/// Checks the CRC, but neither tag nor body.
+/// The receiver checks the addresses before it decodes the body.
 ///
 /// # Errors
-/// [`FrameError`]. The CRC is checked first.
+/// [`FrameError`]. The CRC is checked first, so every other error is about an intact frame.
 pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
     let (head, rest) = checked
@@ -207,7 +209,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     })
 }
 
-/// Decodes header and message; the tag is not verified.
+/// Decodes header and message of a frame: [`open`], then [`Message::decode`]. The tag is not verified.
 ///
 /// # Errors
 /// [`FrameError`]; a handshake is not a message.
@@ -225,7 +227,8 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// Encodes a frame by COBS in place; returns its length. The frame is `out[1..=len]`, under 254 bytes.
+/// Encodes a frame by COBS in place, and appends the delimiter; returns the total length. The frame is at
+/// `out[1..=len]`, fewer than 254 bytes. The encoders of the crate `cobs` would need a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;

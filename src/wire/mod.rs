@@ -1,9 +1,9 @@
 //! Wire format of frames and messages.
 //!
-//! [`deframe`] splits the byte stream and decodes COBS, [`frame`] has addresses and the CRC, [`message`] the messages.
-//! [`digest`] has the digest of a mission, [`auth`] the authentication, `endpoint` one node's frames, `upload` uploaded
-//! missions. This file has the check sequence and the range of node numbers. `FORMAT.md` in this folder has the byte
-//! tables, `CONTRIBUTING.md` the steps to add a message.
+//! [`deframe`] splits the byte stream and decodes COBS, [`frame`] has addresses and the CRC, [`message`] the messages, [`digest`]
+//! the digest of a mission, [`auth`] the authentication, `endpoint` one node's frames, `upload` uploaded missions. This file has
+//! the check sequence and the range of node numbers. `FORMAT.md` in this folder has the byte tables, `CONTRIBUTING.md` the steps to add
+//! a message.
 
 pub mod auth;
 mod blake2s;
@@ -17,17 +17,18 @@ pub mod upload;
 
 use crc::{CRC_32_ISCSI, Crc, Table};
 
-/// CRC-32C (Castagnoli), the check sequence of every frame.
+/// CRC-32C (Castagnoli), the check sequence at the end of every frame. Constant work per byte.
 ///
-/// Constant work per byte. Its Hamming distance is 6 for the lengths used here, that of CRC-32 is 5. The table of 256
-/// words takes 1 KiB of flash. Without it a full frame exceeds its budget of instructions.
+/// Its Hamming distance is 6 for the lengths used here; the Hamming distance of CRC-32 is 5. The table of 256 words
+/// takes 1 KiB of flash. Without a table a full sweep, for which the CRC is computed twice, is far above its budget
+/// of instructions.
 pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
 /// Largest valid node number; 4095 is reserved for broadcasts.
 pub const MAX_NODE: u16 = 4094;
 
-/// Number of nearest nodes that get hellos, per direction.
+/// Number of nearest nodes in one direction to which hellos are sent. One of them becomes the neighbour.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Maximum length of a frame with sixteen target SIRs, bytes.
+/// Maximum length on the wire of a sweep message with its frame, bytes. A sweep carries up to sixteen target SIRs.
 pub const MAX_SWEEP: usize = 100 + auth::TAG_ROOM;

@@ -17,9 +17,9 @@
 //! | this relay's own nonce | proof that the node is present |
 //! | a request, and none of the above | reply only |
 //!
-//! Exactly one handshake answers a request that starts a session, that has not this relay's nonce, or that comes from a
-//! node with proved presence; nothing else is answered. So replayed frames cause at most one handshake each, which is
-//! replaced by another pending message, if there is one.
+//! Exactly one handshake answers a request that starts a session, that has not this relay's nonce, or that comes from a node
+//! with proved presence; nothing else is answered. So replayed frames cause at most one handshake each, which is replaced by
+//! another pending message, if there is one.
 //!
 //! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It does
 //! not contain this relay's new nonce, so it is no proof that its sender is present: it causes only a handshake in
@@ -30,77 +30,86 @@ use super::auth::{Auth, Key, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
 use crate::time::{Duration, Instant};
 
-/// Actual sender of a frame with this relay's own number.
+/// Actual sender of a frame that bears this relay's own node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sender {
-    /// Echo of this relay's own frame.
+    /// The relay itself: the received frame is an echo of a frame that this relay has sent.
     Itself,
-    /// Another node with an unknown claim; perhaps a forger.
+    /// Another node, whose claim to the node number is not known. With signed frames it can be a forger.
     Unknown,
-    /// Another node that claims this relay's number.
+    /// Another node that claims this relay's node number, with its claim.
     Rival(Rival),
 }
 
-/// Claim of another node to this relay's number.
+/// Claim of another node to this relay's node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if its epoch is newer; false if equal.
+    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are equal.
     pub(crate) newer_epoch: bool,
-    /// True if it has no setpoint.
+    /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the claim was sent after this relay's start. Proof: a signature, or this relay's claim number.
+    /// True if the other node certainly sent the claim after this relay's start. The proof is a signature, or this
+    /// relay's own claim number in the message.
     pub(crate) is_current: bool,
 }
 
-/// Bit in the claim number of a relay with a position.
+/// Bit that a relay with a position sets in its claim number, to win against a node that starts later. Of two nodes
+/// with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
-/// Length of a handshake's body, bytes.
+/// Length of an authentication handshake's body, bytes.
 pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference of one node's nonces in an epoch. A larger one shows two nodes.
+/// Maximum difference between the numbers in two nonces of one node and epoch. A nonce's number is its lower half. A
+/// node draws a random first number at its start, and counts up from it. A larger difference therefore shows that two
+/// nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
-/// Old handshakes in a row that are reported.
+/// Number of consecutive handshakes of an older epoch that show that the node's epoch went back. Delayed frames can
+/// cause a smaller number.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// True to send a handshake to this node.
+    /// True if an authentication handshake to this node must be sent.
     handshake: bool,
-    /// True if the next handshake always requests a reply.
+    /// True if the next handshake requests a reply in any case. If false, it requests one only until the node has
+    /// proved its presence.
     requests_reply: bool,
-    /// True if the node has repeated this relay's nonce.
+    /// True if the node has repeated this relay's nonce. The node is then present, and both nodes know each other's
+    /// nonce.
     proven: bool,
-    /// Value of `Session::clock` at the last use.
+    /// Value of `Session::clock` at the last use of this table entry.
     used: u32,
-    /// Time of the last proof of presence.
+    /// Time of the last frame that proved the node present. A handshake with the largest nonce so far also counts as
+    /// proof.
     last_proof: Instant,
-    /// Lower half of this relay's nonce.
+    /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
-    /// Largest nonce received from the node; 0 before the first.
+    /// Largest nonce that this relay has received from the node; 0 if none was received.
     nonce: u64,
     window: Window,
     older: OlderHandshakes,
 }
 
-/// Counter of consecutive handshakes with an outdated nonce.
+/// Counts consecutive handshakes of a node with an outdated nonce. Several of them show that the node's epoch went
+/// back, or that the node restarted in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,
-    /// Frame counter of the last outdated handshake, plus one.
+    /// Frame counter of the last handshake with an outdated nonce, plus one.
     next: u32,
-    /// Number of outdated handshakes in a row.
+    /// Number of consecutive handshakes with an outdated nonce and rising frame counters.
     times: u8,
 }
 
 impl OlderHandshakes {
-    /// Counts an outdated handshake; true at the fifth in a row. They need one epoch and rising counters; replays do
-    /// not count.
+    /// Counts a handshake with an outdated nonce, of epoch `epoch` and frame counter `counter`. Returns true if it is
+    /// the fifth in a row (`WENT_BACK`) with this epoch and rising frame counters; replays do not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -132,44 +141,50 @@ impl Peer {
 pub(crate) struct Session {
     key: Key,
     epoch: u32,
-    /// Silence after which another node takes over a node number.
+    /// Silence of a node after which another node with the same node number is accepted in its place.
     gone_after: Duration,
-    /// Random claim number; the larger of two wins. Nonces count up from it.
+    /// Random claim number that this relay draws at its start. Of two nodes with the same node number, the one with
+    /// the larger claim number wins. The lower halves of this relay's nonces count up from it.
     claim: u32,
-    /// Lower half of the last created nonce.
+    /// Lower half of the last nonce that this relay has created.
     last_number: u32,
-    /// Claim of another node to this number; `None` once read.
+    /// Claim of another node to this relay's node number, as shown by a handshake. `None` once the claim has been
+    /// read.
     rival: Option<Rival>,
-    /// Number of uses of entries, wrapping.
+    /// Number of uses of table entries so far, wrapping. Each entry stores it at its last use.
     clock: u32,
-    /// Neighbours, whose entries are never replaced.
+    /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
     peers: heapless::Vec<Peer, PEERS>,
-    /// Number of the lease renewal with the last shown nonce.
+    /// Number of the lease renewal in which this relay last sent its nonce in a handshake.
     shown: Option<u16>,
 }
 
-/// Result of authenticating a frame.
+/// Result of authenticating a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// New valid message; `first` if the first proof of presence.
+    /// Valid message that was not received before, so its sender is present. `first` is true for the sender's first
+    /// proof of this in the present session.
     Fresh { first: bool },
-    /// New handshake with this relay's nonce; `first` if the first proof.
+    /// New handshake that contains this relay's current nonce, so its sender is present. `first` is true for the
+    /// sender's first proof of this in the present session.
     Handshake { first: bool },
-    /// Handshake without this relay's nonce: perhaps a recording.
+    /// Handshake with the right tag but without this relay's current nonce. It can be a recorded handshake, so it does
+    /// not prove that its sender is present.
     Unproven,
-    /// Frame without a tag.
+    /// Received frame without an authentication tag.
     Unsigned,
-    /// Frame whose tag does not match.
+    /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Authentic frame that is repeated or too old.
+    /// Authentic frame that was received before, or whose counter is too old to know that.
     Replayed,
-    /// Fifth outdated handshake in a row.
+    /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,
 }
 
 impl Session {
-    /// Creates an empty table; nonces count up from `claim`.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. After a silence of
+    /// `gone_after`, another node with the same number can replace a node.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -186,7 +201,8 @@ impl Session {
         }
     }
 
-    /// Protects the neighbours' entries, and greets new neighbours.
+    /// Protects the table entries of `nodes`, the current neighbours, from replacement. Schedules a handshake to each
+    /// neighbour without an entry.
     pub(crate) fn pin(&mut self, nodes: [Option<u16>; 2]) {
         self.pinned = nodes;
         for node in nodes.into_iter().flatten() {
@@ -196,7 +212,7 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to `to`, whose presence is unproved until it replies.
+    /// Schedules a handshake to node `to`. The node's presence counts as not proved until it replies.
     pub(crate) fn greet(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -205,7 +221,8 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes; nonces count up from `claim` or the last one.
+    /// Forgets all nodes, as after a restart. New nonces count up from `claim`, or from the last nonce, whichever is
+    /// larger.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.last_number {
             self.claim = claim;
@@ -214,7 +231,8 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to `to`, once per renewal `number`.
+    /// Schedules a handshake to the known node `to`, once in each lease renewal `number`. The handshake contains this
+    /// relay's nonce, so that another node with this relay's number detects the duplicate.
     pub(crate) fn show(&mut self, to: u16, number: u16) {
         if self.shown == Some(number) {
             return;
@@ -225,7 +243,8 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to node `to` that requests a reply.
+    /// Schedules a handshake to node `to` that requests a reply. After the reply, each of the two nodes knows the
+    /// other's nonce.
     pub(crate) fn request_reply(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -234,8 +253,10 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake with reply from the silent node `to`. Not after its restart in the same epoch: it would
-    /// reuse frame counters.
+    /// Schedules a handshake that requests a reply from the silent node `to`.
+    ///
+    /// Does nothing if the node has restarted in the same epoch. The handshake would tell the node its former nonce.
+    /// The node could then continue its former session, and use frame counters twice.
     pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;
@@ -244,19 +265,20 @@ impl Session {
         }
     }
 
-    /// Returns another node's claim to this relay's number, once.
+    /// Returns the claim of another node to this relay's node number, if a handshake has shown one. Returns each
+    /// claim once.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()
     }
 
-    /// Returns a node that must get a handshake now.
+    /// Returns a node to which a handshake must be sent, and marks it as sent; `None` if there is none.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;
         Some(peer.node)
     }
 
-    /// Returns true if node `to` can verify this relay's tags.
+    /// Returns true if node `to` can verify the tags of this relay's frames.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.find(to).is_some_and(|peer| peer.proven)
     }
@@ -292,7 +314,7 @@ impl Session {
         }
     }
 
-    /// Authenticates an intact frame of `sender`. Work: one tag.
+    /// Authenticates an intact frame from node `sender`. Work: the computation of one tag.
     pub(crate) fn check(&mut self, now: Instant, sender: u16, frame: &Opened<'_>) -> Checked {
         let Some(tag) = frame.tag else {
             return Checked::Unsigned;
@@ -322,7 +344,7 @@ impl Session {
         Checked::Fresh { first }
     }
 
-    /// Checks a handshake's tag; `None` if it is wrong.
+    /// Checks the authentication tag of a handshake; `None` if the tag is wrong.
     fn check_handshake(
         &mut self,
         now: Instant,
@@ -382,7 +404,8 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns who sent `frame`, which has this relay's number.
+    /// Returns the sender of `frame`, whose sender number is this relay's own: this relay, or another node. Work: the
+    /// computation of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
@@ -400,7 +423,8 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns which node made `nonce`; `Unknown` for an older epoch.
+    /// Returns the node that made `nonce`: this relay, or another node with this relay's node number. `Unknown` if the
+    /// nonce's epoch (start counter) is older than this relay's epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {
@@ -422,7 +446,7 @@ impl Session {
         self.peers.iter().find(|peer| peer.node == node)
     }
 
-    /// Returns the entry of `node` and marks it as used.
+    /// Returns the table entry of `node` and marks it as just used; `None` if there is no entry.
     fn touch(&mut self, node: u16) -> Option<&mut Peer> {
         self.clock = self.clock.wrapping_add(1);
         let peer = self.peers.iter_mut().find(|peer| peer.node == node)?;
@@ -430,8 +454,11 @@ impl Session {
         Some(peer)
     }
 
-    /// Creates an entry for `node`. A full table loses an unpinned entry. None after four billion: nonces must not be
-    /// reused.
+    /// Creates a table entry for `node` if there is none.
+    ///
+    /// If the table is full, it replaces an entry that is not pinned: if possible the entry of a node without proof of
+    /// presence, otherwise the least recently used one. After four billion entries it creates no more, because a nonce
+    /// must not be used twice.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
@@ -466,7 +493,7 @@ impl Session {
     }
 }
 
-/// Returns a nonce's lower half (number) and upper half (epoch).
+/// Splits a nonce into its lower half (a number) and its upper half (the epoch), in this order.
 const fn halves(nonce: u64) -> [u32; 2] {
     let [a, b, c, d, e, f, g, h] = nonce.to_le_bytes();
     [
@@ -475,14 +502,14 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch are of two nodes. Their lower halves differ by more than [`MAX_GAP`],
-/// without [`RAISED`].
+/// Returns true if two nonces of one epoch belong to two nodes with the same node number. The lower halves of such nonces differ by more
+/// than [`MAX_GAP`]; the bit [`RAISED`] is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > MAX_GAP
 }
 
-/// Returns the nonces in a handshake; `None` for another frame.
+/// Returns the nonces in a handshake's body: of its sender, and of its receiver. `None` if `frame` is no handshake.
 fn nonces_of(frame: &Opened<'_>) -> Option<Nonces> {
     let (other, rest) = frame.body.split_first_chunk::<8>()?;
     let (known, &[0 | 1]) = rest.split_first_chunk::<8>()? else {

@@ -1,26 +1,26 @@
 //! Uploaded mission, which replaces the mission loaded before flight. Also the format in which a relay stores it.
 //!
-//! An upload has a *version*, which identifies the newest one, and the digest of its *base*, the mission loaded before
-//! flight; relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it
-//! has one interferer, because a field does not fit into a frame.
+//! An upload has a *version*, which identifies the newest one, and the digest of its *base*, the mission loaded before flight;
+//! relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it has one
+//! interferer, because a field does not fit into a frame.
 
 use super::digest::MissionId;
 use super::digest::{between, digest, of};
 use crate::geodetic::{LineError, Sites};
 use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 
-/// Mission uploaded in flight, with a version.
-///
-/// It replaces the mission loaded before flight.
+/// Mission that the operator uploads in flight, with a version. It replaces the mission loaded before flight.
 #[cfg(feature = "upload")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Upload {
     version: u16,
     base: u16,
-    /// Valid parameters, with a single interferer and no field.
+    /// Valid parameters of the uploaded mission. It has a single interferer: a mission with an interference field
+    /// cannot be uploaded.
     config: MissionConfig,
-    /// Positions of Tx and Rx; `None` for the configured ones. Each relay checks that they fit the mission.
+    /// Positions of Tx and Rx of this mission; `None` for the positions in the relays' configuration. The positions are
+    /// valid, but each relay still checks that they fit the mission.
     sites: Option<Sites>,
 }
 
@@ -29,23 +29,23 @@ pub struct Upload {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum UploadError {
-    /// The version is 0: the mission loaded before flight.
+    /// The version of the upload is 0, which identifies the mission loaded before flight.
     Version,
-    /// The number of relays differs from the loaded mission.
+    /// The number of relays differs from the number in the mission loaded before flight.
     Relays,
-    /// A mission, uploaded or loaded, has an interference field.
+    /// The mission loaded before flight, or the uploaded mission, has an interference field. A field is a known
+    /// distribution of the interference along x.
     Field,
-    /// A parameter is outside its range.
+    /// A parameter of the new mission is outside its range.
     Mission(MissionError),
-    /// The upload was made for another loaded mission.
+    /// The upload was made for another mission than the mission loaded into this relay before flight.
     Base,
-    /// The mission does not fit Tx and Rx, the geofence or the settings.
-    ///
-    /// Or the positions of Tx and Rx are invalid, or have another distance than the mission.
+    /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. Or the positions
+    /// are invalid, or have another distance than the mission.
     Line(LineError),
-    /// The relay already has this mission or a newer one.
+    /// The relay already has the uploaded mission or a newer mission.
     Old,
-    /// Frames are not signed: `Settings::auth` is not set.
+    /// Frames are not signed, because `Settings::auth` is not set.
     Unsigned,
     /// The relay has already started: use `Relay::handle_upload`.
     Begun,
@@ -75,10 +75,10 @@ impl core::error::Error for UploadError {}
 
 #[cfg(feature = "upload")]
 impl Upload {
-    /// Creates an upload of `config` for relays that loaded `base`.
+    /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
-    /// `version` is 1 to 65535. The path-loss factor eta of links to the ground is clamped between `mu_los` and
-    /// `mu_nlos`, because rounding can put it outside.
+    /// The path-loss factor eta of links to the ground is clamped between the factors with line of sight (`mu_los`) and
+    /// without (`mu_nlos`), because rounding can put eta outside of this range.
     ///
     /// # Errors
     /// [`UploadError`] names the problem.
@@ -94,13 +94,13 @@ impl Upload {
         Self::checked(version, digest(base), config, None)
     }
 
-    /// Adds the positions of Tx and Rx to the uploaded mission.
+    /// Adds the positions of Tx and Rx to the uploaded mission. Relays compute latitudes and longitudes from them.
     ///
-    /// Relays compute latitudes and longitudes from them. Without this call they use the configured ones, even after an
-    /// earlier upload with others.
+    /// Without this call, relays use the Tx and Rx positions of their configuration, even if an earlier upload had
+    /// others.
     ///
     /// # Errors
-    /// [`UploadError::Line`] if the positions define no line, or one of another length than the mission's distance.
+    /// [`UploadError::Line`] if the positions define no line, or a line whose length is not the mission's distance.
     pub fn with_sites(self, sites: Sites) -> Result<Self, UploadError> {
         let valid = sites.are_valid().then_some(sites);
         let sites = valid.ok_or(UploadError::Line(LineError::Sites))?;
@@ -132,27 +132,27 @@ impl Upload {
         })
     }
 
-    /// Version of the upload, from 1; the larger one is newer.
+    /// Version of the uploaded mission, from 1; the larger version is newer.
     pub const fn version(&self) -> u16 {
         self.version
     }
 
-    /// Digest of the mission loaded before flight.
+    /// Digest of the mission loaded before flight, which the upload replaces.
     pub const fn base(&self) -> u16 {
         self.base
     }
 
-    /// Returns the parameters, which [`Mission::try_new`] accepts.
+    /// Returns the uploaded mission's parameters, which [`Mission::try_new`] accepts.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
     }
 
-    /// Positions of Tx and Rx; `None` for the configured ones.
+    /// Positions of Tx and Rx in the upload. `None` if relays must use the positions of their configuration.
     pub const fn sites(&self) -> Option<Sites> {
         self.sites
     }
 
-    /// Identifier of the upload: version and digest.
+    /// Identifier of the uploaded mission: its version and its digest.
     pub fn id(&self) -> MissionId {
         MissionId {
             version: self.version,
@@ -161,9 +161,8 @@ impl Upload {
     }
 }
 
-/// Uploaded mission; uninhabited without the feature `upload`.
-///
-/// The compiler then drops all code that handles one.
+/// Mission uploaded by the operator. The type is uninhabited without the feature `upload`, so that the compiler drops
+/// all code that handles one.
 #[cfg(not(feature = "upload"))]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Upload {}
@@ -188,7 +187,8 @@ impl Upload {
     }
 }
 
-/// Checks that `sites` are `distance_m` from each other. Without the feature `flight` all are accepted.
+/// Checks that the distance between `sites`, the positions of Tx and Rx, is `distance_m`. Without the feature
+/// `flight` the distance cannot be computed, and all valid positions are accepted.
 pub(crate) fn check_line(sites: Sites, distance_m: f32) -> Result<(), LineError> {
     #[cfg(feature = "flight")]
     let fits = crate::flight::axis::Axis::between(sites)

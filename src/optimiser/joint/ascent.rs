@@ -7,79 +7,88 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the moves, tried until the chain improves.
+/// Fractions of the relays' computed moves. An iteration tries them in this order until the chain improves.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move, divided by the distance from the interferer.
+/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. It also limits
+/// the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Smallest trust that allows a prediction.
+/// Minimum trust (limit of the relays' moves) at which an improvement's final target is predicted. With a smaller trust
+/// the prediction would be too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust below which the improvement ends without progress.
+/// Trust (limit of the relays' moves) below which the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Least assumed shortening per ln(target SIR), in Tx-Rx distances. It is a divisor.
+/// Minimum assumed rate at which a rising ln(target SIR) shortens the chain. The unit of length is the distance from Tx
+/// to Rx. The rate is a divisor; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the target's limit, in ln(SIR).
+/// First increase of the target's limit, in ln(SIR). The limit is raised if the chain meets it but misses the upper
+/// bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First upper limit on the slack, in Tx-Rx distances. More slack could outweigh the penalty.
+/// First upper limit on the chain's slack, divided by the distance from Tx to Rx. Without the limit a large slack could
+/// outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Smallest upper limit on the slack, in Tx-Rx distances.
+/// Smallest upper limit on the chain's slack, divided by the distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Weight of negative slack relative to positive slack.
+/// Weight of a negative slack relative to a positive slack, when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Increase of ln(target SIR) that counts as idle.
+/// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
+/// improvement.
 const CLOSE: f32 = 3e-6;
 
-/// Expected increase of ln(target SIR) that ends the improvement.
+/// Expected increase of ln(target SIR) below which the improvement of a chain ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of ln(target SIR) below which predictions are possible.
+/// Expected increase of ln(target SIR) below which the final target of an improvement can be predicted.
 const FORESEEN: f32 = 1e-4;
 
-/// Iterations after which a far too short chain has diverged.
+/// Number of iterations after which a chain that falls far short of Rx counts as diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Largest shortfall that is improved again, in Tx-Rx distances.
+/// Largest shortfall from Rx of a chain that is improved again. The unit is the distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
-    /// Try the fraction `share` of the moves at the target `sigma`.
+    /// Try the fraction `share` of the relays' computed moves, with the target `sigma` = ln(SIR).
     Try { share: f32, sigma: f32 },
-    /// Raise the target as far as the unchanged chain allows.
+    /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
-    /// Compute new moves, from the last relay to the first.
+    /// Compute new moves of the relays by a backward pass, from the last relay to the first.
     Again,
-    /// End the improvement, or repeat it with less allowed slack.
+    /// End the improvement of this chain, or repeat the improvement with a lower limit on the slack.
     Over,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
-    /// Target of the current chain, ln(SIR).
+    /// Target SIR of the current chain, as ln(SIR).
     pub(crate) sigma: f32,
-    /// Length beyond Rx at the target, m; below 0 if short.
+    /// Slack of the current chain, m: how far it could reach beyond Rx at its target SIR. Below 0 if the chain is too
+    /// short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target that is compared with the upper bound, ln(SIR).
+    /// Target, in ln(SIR), at which the chain is compared with the upper bound of all chains. It is raised if the chain
+    /// misses this bound.
     pub(crate) limit: f32,
     /// Next increase of `limit`, in ln(SIR).
     excess: f32,
-    /// Upper limit on the slack, in Tx-Rx distances.
+    /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. It is lowered if relays are too
+    /// near the interferer, because a large slack would outweigh the penalty for them.
     spare: f32,
-    /// Penalty for relays too near the interferer, m.
+    /// Penalty for relays too near the interferer, m. It is subtracted from the chain's slack.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// Change of slack per ln(target SIR), m; below 0.
+    /// Change of the chain's slack per unit of ln(target SIR), m; below 0.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
@@ -90,7 +99,7 @@ pub(crate) struct Ascent {
 }
 
 impl Ascent {
-    /// State before the first improvement: all bytes are 0.
+    /// Empty state before the first improvement of a chain: all its bytes are 0.
     pub(crate) const NONE: Self = Self {
         spare: 0.0,
         limit: 0.0,
@@ -99,7 +108,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts at the target `sigma` with the slack `slack`, m. Targets are ln(SIR), at least `floor`.
+    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. Targets are in ln(SIR), and
+    /// never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -120,7 +130,9 @@ impl Ascent {
         }
     }
 
-    /// Returns this state with another `limit`, in ln(SIR).
+    /// Returns this state with another limit of the target, in ln(SIR).
+    ///
+    /// At this target the chain is compared with the upper bound of all chains.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -129,17 +141,19 @@ impl Ascent {
         }
     }
 
-    /// Returns the upper limit on the slack, m.
+    /// Returns the upper limit on the chain's slack, m. Slack above this limit does not count when chains are
+    /// compared.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the limit.
+    /// Returns true if [`tighten`](Self::tighten) would lower the upper limit on the chain's slack.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the limit on the slack; true if it did.
+    /// Lowers the upper limit on the chain's slack if relays are too near the interferer. Returns true if the limit
+    /// was lowered.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -148,7 +162,8 @@ impl Ascent {
         true
     }
 
-    /// Returns the next action after a lower limit on the slack.
+    /// Returns the next action after the upper limit on the chain's slack was lowered. `slack` is the chain's slack
+    /// under the new limit, m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -156,12 +171,14 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the target has reached its limit.
+    /// Returns true if the target SIR has reached its limit. The chain must then be compared with the upper bound of
+    /// all chains.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the target's limit, and returns the next action.
+    /// Raises the limit of the target SIR; returns the next action. The chain has met the limit, but not the upper
+    /// bound.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -173,14 +190,15 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds one segment's expected increase of slack, and its slope.
+    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. They are the gain
+    /// of slack expected from the relays' moves, and the change of slack with the target.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
         self.square += outlook.square;
     }
 
-    /// Returns the next action after all moves are computed.
+    /// Returns the next action after the backward pass has computed the moves of all relays.
     pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -201,23 +219,26 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) changes by less than `by`.
+    /// Returns true if ln(target SIR) is expected to change by less than `by`. The change follows from the slack and
+    /// the relays' moves.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Returns true if the improvement diverges, far short of Rx.
+    /// Returns true if the improvement diverges: after 12 iterations the chain still falls far short of Rx.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if a short chain is worth another improvement.
+    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a
+    /// chain is improved again, with a lower limit on its slack.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the improvement should end at most at `sigma`.
+    /// Returns true if the improvement of this chain is predicted to end at or below `sigma`, in ln(SIR). Such a chain
+    /// can be dropped. `turn` is the next action of the improvement. False if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -228,7 +249,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target that the moved chain should meet, ln(SIR).
+    /// Returns the target that the chain is expected to just meet, in ln(SIR). The relays make the fraction `share` of
+    /// their computed moves.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -247,12 +269,14 @@ impl Ascent {
         }
     }
 
-    /// Returns the target that just reaches Rx, ln(SIR). Negative slack counts twice.
+    /// Returns the merit of a chain: the target, as ln(SIR), at which the chain would just reach Rx. `slack` is the chain's slack at the
+    /// target `sigma`, m. A negative slack counts twice.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current.
+    /// Returns true if a trial chain is better than the current chain. `slack` is the trial chain's slack, m, at the
+    /// target `sigma`, as ln(SIR).
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -261,7 +285,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the next action after a failed trial.
+    /// Returns the next action after a trial that did not improve the chain. It is a trial with a smaller fraction of
+    /// the computed moves. After the smallest fraction, new moves are computed with a lower maximum length.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -274,7 +299,8 @@ impl Ascent {
         turn
     }
 
-    /// Accepts the trial chain, and returns the next action.
+    /// Accepts the trial chain, and returns the next action. The relays made the fraction `share` of their computed
+    /// moves. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -293,7 +319,8 @@ impl Ascent {
         }
     }
 
-    /// Returns the next action after the target rose to `sigma`.
+    /// Returns the next action after the target of the unchanged chain was raised to `sigma`, in ln(SIR). `slack` is
+    /// the chain's slack at this target, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

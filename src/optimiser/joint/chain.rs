@@ -13,12 +13,12 @@ use crate::place::{CrossSection, Placement};
 use crate::root::{PowerRatio, sqrt};
 use crate::sir::{Sender, square, transmitter_gain};
 
-/// Profile of each relay, by its index 1 to N.
+/// Profiles of the relays of a chain: a function of a relay's index, 1 to N.
 pub(super) trait SeatOf: Fn(u16) -> Seat {}
 
 impl<F: Fn(u16) -> Seat> SeatOf for F {}
 
-/// Chain to be solved: its mission and its relays' profiles.
+/// Chain to be solved: its mission, and the profiles of its relays.
 #[derive(Clone, Copy)]
 pub(super) struct Chain<'a, F> {
     pub(super) mission: &'a Mission,
@@ -28,7 +28,7 @@ pub(super) struct Chain<'a, F> {
 }
 
 impl<'a, F: SeatOf> Chain<'a, F> {
-    /// Creates the chain of `mission`; `None` in an interference field.
+    /// Creates the chain of `mission`; `None` for a mission with an interference field.
     pub(super) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
         Some(Self {
             mission,
@@ -54,12 +54,14 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x with room for later relays, m.
+    /// Returns the largest x of a relay, m, that leaves later relays room for their minimum separation.
+    ///
+    /// `end_m` is the largest x of the previous relay, m, and `step` the minimum step in x from that relay, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
 
-    /// Returns the sender of the hop to relay `index`.
+    /// Returns the sender of the hop to relay `index`: Tx, or relay `index` - 1 at `from`.
     pub(super) fn sender(&self, index: u16, from: Placement) -> Sender {
         if index <= 1 {
             return Sender::transmitter(self.mission);
@@ -76,7 +78,11 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         }
     }
 
-    /// Returns c, the target divided by the gain. With noise: times `1 + noise / interference` at the sender.
+    /// Returns c, the target SIR divided by the sender's gain, for the hop to relay `index`.
+    ///
+    /// The gain is the sender's power divided by the interferer's power. c determines the hop's maximum length. With
+    /// noise, c includes the factor 1 + noise / interference at the sender's position `from`, because the position of
+    /// relay `index` is not known yet.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -84,7 +90,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the fixed altitude of relay `index`, m; `None` if free.
+    /// Returns the fixed altitude of relay `index`, m. `None` if the relay is free to choose its altitude, or if the
+    /// mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -95,7 +102,10 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude interpolated between fixed ones, m. Outside them it is constant if `level`, else falls.
+    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude.
+    ///
+    /// Before the first and after the last of them the altitude is constant if `level` is true. Otherwise it falls to
+    /// the lowest permitted altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -111,13 +121,17 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns relay `index` as receiver of a hop from `from`.
+    /// Returns relay `index` as the receiver of a hop from `from`. `room` has the relay's permitted lateral offsets and
+    /// altitudes.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the chain, m, and its derivatives by the last relay.
+    /// Returns the slack of the chain for `target`, m, and its derivatives. They are by the position `at` of the last
+    /// relay.
+    ///
+    /// The slack is the maximum length of the last hop for `target`, minus the length of this hop.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = self.seat(self.relays());
         let most = site::last_most(self.mission, power_w, room);
@@ -129,7 +143,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (slack, outlook)
     }
 
-    /// Returns an upper bound on the chain's ln(SIR).
+    /// Returns an upper bound on the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and
+    /// the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = self.seat(self.relays());
         let first = self.room(1);
@@ -138,7 +153,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the lowest target that limits every hop, ln(SIR).
+    /// Returns the lowest target, in ln(SIR), that limits the length of every hop. It is just above the largest gain of
+    /// a hop. With a lower target, a hop beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -147,12 +163,16 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 }
 
-/// Gains of all hops both ways, in Tx-Rx distances. `SIR = gain / (interference l^2)`.
+/// Gains of all hops of a chain, in both directions. The SIR of a hop is its gain, times the inverse interference at
+/// the receiver, divided by the squared length of the hop. For the receivers Rx and Tx, the gain already includes the
+/// interference.
+///
+/// Lengths are in units of the distance D from Tx to Rx. The gains can also be stored as logarithms.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
-    /// Position of the interferer, in units of the Tx-Rx distance.
+    /// Position (x, y, h) of the interferer, in units of the distance from Tx to Rx.
     pub(super) source: Triple,
-    /// Noise divided by the interferer's power at the Tx-Rx distance.
+    /// Receiver noise divided by the interferer's power received at the distance D (nu).
     pub(super) noise: f32,
     relay: f32,
     to_rx: f32,
@@ -172,7 +192,8 @@ impl Gains {
         from_rx: 0.0,
     };
 
-    /// Returns the gains for `power_w` watts, converted by `stored`.
+    /// Returns the gains for relays of `power_w` watts. `stored` converts each gain to its stored form, such as its
+    /// logarithm.
     pub(super) fn new(
         chain: &Chain<'_, impl SeatOf>,
         power_w: f32,
@@ -191,7 +212,8 @@ impl Gains {
         }
     }
 
-    /// Returns hop `k`'s gains, forward and backward. `k` is 1 (from Tx) to N + 1 (to Rx).
+    /// Returns the gains of hop `k` forward and backward. `k` is 1 (from Tx) to N + 1 (to Rx), and `relays` is N.
+    /// `sent_by` returns a gain for the power of the relay with the given index.
     pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
         let there = match k {
             1 => self.from_tx,
@@ -207,7 +229,8 @@ impl Gains {
     }
 }
 
-/// Returns where a relay at Rx's x receives Tx best.
+/// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. Candidates are the
+/// limits of `room`, and the lateral offset 0.
 pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -224,18 +247,21 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays whose moves are in memory; 0 without `altitude`.
+/// Number of relays whose computed moves are in memory at one time. It is one segment, or 0 without the feature
+/// `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of a segment of ten relays.
+/// Stored state of the solver for one segment, which is ten consecutive relays. It has the x of the relay before the
+/// segment, and the derivatives of the chain's slack by the position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the slack by the last relay, m/m.
+    /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives: xx, xy, xh, yy, yh, hh, 1/m.
+    /// Second derivatives of the chain's slack by the coordinates of the segment's last relay, 1/m. The order is xx,
+    /// xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 
@@ -280,7 +306,8 @@ pub(super) fn last_of(mission: &Mission) -> u8 {
     u8::try_from(last).unwrap_or(u8::MAX)
 }
 
-/// Returns a segment's relays: number from 0, and index.
+/// Returns the relays of a segment. Each item has the relay's number within the segment, from 0, and its index in the
+/// chain.
 pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
     let first = u16::from(segment) * SEGMENT_RELAYS;
     // Counted in u16 at both ends, since zipping two ranges backward may panic.
@@ -289,18 +316,18 @@ pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<It
         .filter(move |(_, index)| *index <= relays)
 }
 
-/// Profile of a relay: power, permitted lateral offsets and altitudes.
+/// Profile of one relay for the joint method: power, permitted lateral offsets and permitted altitudes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
-    /// Permitted lateral offsets and altitudes.
+    /// Permitted lateral offsets and altitudes of the relay.
     pub room: Room,
-    /// Transmit power, W.
+    /// Transmit power of the relay, W.
     pub power_w: f32,
 }
 
 impl Seat {
-    /// Returns the mission's common profile.
+    /// Returns the profile that the mission gives to relays without a profile of their own.
     pub const fn common(mission: &Mission) -> Self {
         Self {
             room: Room::of(mission),
@@ -308,7 +335,8 @@ impl Seat {
         }
     }
 
-    /// Returns a relay's profile; `holds` fixes its altitude.
+    /// Returns the profile of a relay with the altitude and power `own`. The relay keeps this altitude if `holds` is
+    /// true; otherwise it is free to choose another.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

@@ -1,7 +1,6 @@
 //! Fitted slots, each as long as its hop needs: positions of a chain for the largest data rate.
 //!
-//! With the spectral efficiency b = log2(1 + SINR / gap) of a hop, forward F and backward B, one bit to Rx and r bits
-//! back take
+//! With the spectral efficiency b = log2(1 + SINR / gap) of a hop, forward F and backward B, one bit to Rx and r bits back take
 //!
 //! ```text
 //! time = sum over hops of  1 / b(F) + r / b(B)
@@ -10,15 +9,14 @@
 //! in units of 1 / bandwidth; the rate is its inverse. A hop's time rises steeply with its length from 0, and is
 //! concave there. So the best chain mostly has a few long hops, and the other relays gather at their minimum
 //! separation. The sum has many local optima, and derivatives do not lead from one to another. But each term depends on
-//! two neighbours only. Let every relay stay, or move by one or two widths along one coordinate. Then one pass over the
+//! two neighbours only. So if every relay may stay or move by one or two widths along one coordinate, one pass over the
 //! relays finds the best of all 5^N combinations (dynamic programming; Viterbi 1967). The method repeats such passes
 //! over x, y and altitude, and halves the width when a round gains little. With the first width, relays jump from one
 //! group to another. No step raises the time. The method needs no derivatives, and the minimum separation is simply a
 //! condition of each hop.
 //!
-//! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx.
-//! Lengths are in units of D, in which the widths are powers of two: the relays of a group keep their distances
-//! exactly.
+//! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
+//! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.
 
 use super::chain::{Chain, Gains, SeatOf};
 use super::hop::{Triple, minus};
@@ -29,29 +27,31 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Positions tried per relay: the current one, two either way.
+/// Number of positions that a pass tries for each relay: the current one, and two in either direction.
 const STATES: usize = 5;
-/// Tried moves, in step widths; the first of equals wins.
+/// Moves of a relay that a pass tries, in units of the current step width. Of equally good moves the first in this list
+/// is preferred.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits that store one of the five states.
+/// Number of bits that store the choice among the five states of the previous relay.
 const BITS: usize = 3;
 
-/// Step width that ends a search, in Tx-Rx distances.
+/// Step width at which the search from one initial chain ends, in units of D.
 const NARROWEST: f32 = 1.0 / 131_072.0;
-/// Relative improvement below which the step width is halved.
+/// Relative gain of a round of passes below which the step width is halved.
 const LITTLE: f32 = 1e-3;
-/// Maximum number of rounds from one initial chain.
+/// Maximum number of rounds of passes over one initial chain.
 const ROUNDS: u8 = 200;
 
-/// Number of relays per call while moves are tried.
+/// Number of relays per call in a pass of the solver.
 const AT_ONCE: u16 = 3;
-/// Number of relays per call in all other work.
+/// Number of relays per call in all other work of the solver.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to a squared length: no hop time is 0.
+/// Amount added to each squared hop length, in units of D^2, so that no hop time is 0.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first x, last x, first step width, in Tx-Rx distances. Equal x mean the minimum separation.
+/// Initial chains: first and last x of the relays, and first step width of the moves, in units of D. If both x are
+/// equal, the relays start there at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -62,48 +62,48 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Initial chain that begins with the best one so far.
+/// Index, from 0, of the initial chain that starts from the best chain found along the line Tx to Rx. Used only if
+/// relays may leave the common altitude or the line.
 const BEST: u8 = 8;
-/// First step width of [`BEST`], in Tx-Rx distances.
+/// First step width of the moves from the best chain along the line, in units of D.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Offset and altitude of further initial chains, as fractions.
+/// Lateral offset and altitude of further initial chains, as fractions of two ranges. The first range is from 0 to the
+/// largest lateral offset away from the interferer, the second from the common altitude to the highest altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Time slots of a relay's hops: begin and end as fractions of the frame.
+/// Fitted slots of the hops next to a relay: begin and end of each, as fractions of the frame, 0 to 1.
 ///
-/// Fractions are 0 to 1, multiples of about 6e-8; a shorter slot can become empty. The order is toward Rx from hop 1
-/// (from Tx) to hop N + 1 (to Rx), then back. A slot begins where the slot before it ends, to the bit. The slots of Tx
-/// are `from_tx` and `to_tx` of the first relay, those of Rx `to_rx` and `from_rx` of the last. For a radio, all nodes
-/// also need the length of the frame and a common clock.
+/// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
+/// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
+/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio the
+/// length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about 6e-8,
+/// so a shorter slot can become empty.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
-    /// Slot in which this relay sends toward Rx.
+    /// Begin and end of the slot in which this relay sends to the next node toward Rx.
     pub to_rx: [f32; 2],
-    /// Slot in which this relay sends toward Tx.
-    ///
-    /// Empty, both 1, in a mission of one direction.
+    /// Begin and end of the slot in which this relay sends to the next node toward Tx. In a mission of one direction
+    /// both are 1: the slot is empty.
     pub to_tx: [f32; 2],
-    /// Slot in which this relay receives from the node toward Tx.
+    /// Begin and end of the slot in which this relay receives from the next node toward Tx.
     pub from_tx: [f32; 2],
-    /// Slot in which this relay receives from the node toward Rx.
-    ///
-    /// Empty, both 1, in a mission of one direction.
+    /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission of one
+    /// direction both are 1: the slot is empty.
     pub from_rx: [f32; 2],
-    /// Data rate of the chain to Rx, divided by the bandwidth, bit/s/Hz.
-    ///
-    /// The data rate back to Tx is `reverse` times this.
+    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
+    /// times this.
     pub bits_per_hz: f32,
 }
 
-/// Tried position, and the inverse interference there.
+/// Position tried for a node, and the inverse interference there, which is 1 at Tx and Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
     quiet: f32,
 }
 
-/// Tried position of a relay, and the time from Tx.
+/// Position tried for one relay, and the shortest total time of the hops from Tx up to that relay.
 #[derive(Clone, Copy, Debug)]
 struct State {
     spot: Spot,
@@ -120,17 +120,18 @@ impl State {
     };
 }
 
-/// Hop: its gains divided by the SNR gap, r, and the minimum separation.
+/// Hop between two nodes: its gains, r, and the minimum separation. r is the data rate back divided by the data rate to
+/// Rx. `gains` has the forward and the backward gain, each divided by the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
     reverse: f32,
-    /// Minimum squared distance; `None` at Tx or Rx.
+    /// Minimum squared distance of the two relays, in units of D^2. `None` if an end of the hop is Tx or Rx.
     apart: Option<f32>,
 }
 
 impl Hop {
-    /// Returns the forward and backward SINR divided by the SNR gap.
+    /// Returns the forward and the backward SINR, linear, each divided by the SNR gap.
     fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
         let l = square(x) + square(y) + square(h) + SHORTEST;
@@ -138,7 +139,8 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times for one bit to Rx and r back. Infinite if too close or out of order.
+    /// Returns the times to send one bit toward Rx and r bits back. Both are infinite if two relays are too close or
+    /// out of order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
@@ -162,48 +164,51 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of initial positions, after this many relays.
+    /// Choice of the positions of an initial chain, some relays at a time. The field is the number of relays done.
     Begin(u16),
-    /// Search forward for the fastest moves, at this node.
+    /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
+    /// the next node to process: 1 for the first relay, N + 1 for Rx.
     Pass(u16),
-    /// Move of the relays from this one back; index in [`MOVES`].
+    /// Backward pass, from the last relay to the first: moves the relays as in the best combination. The fields are the
+    /// next relay to move, and the index of its move in [`MOVES`].
     Back(u16, u8),
-    /// Sum of the hop times, from this node on.
+    /// Summation of the hop times of the best chain, and search for its lowest SIR. The field is the next node.
     Sum(u16),
 }
 
-/// Solver of the largest data rate: time slots as hops need.
+/// Solver of a chain with fitted slots: time slots as long as each hop needs. It maximises the data rate.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
-    /// Gains of 1 W relays, divided by the SNR gap.
+    /// Gains of the hops from relays of 1 W, each divided by the SNR gap.
     gains: Gains,
-    /// Positions of the current chain, in Tx-Rx distances.
+    /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. At the end x and y hold sums of hop times.
+    /// Positions of the best chain. At the end of the search, two sums of hop times from Tx to the relay, toward Rx and
+    /// back, replace each relay's x and y.
     best_places: [Triple; RELAYS],
-    /// Best previous state for each state, three bits each.
+    /// Best state of the previous relay for each of a relay's five states: three bits each.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
-    /// Number of the initial chain, from 0.
+    /// Number of the current initial chain, from 0.
     number: u8,
     rounds: u8,
-    /// Coordinate that changes now: 0 x, 1 y, 2 altitude.
+    /// Coordinate that the current pass changes: 0 for x, 1 for y, 2 for the altitude.
     axis: u8,
     width: f32,
-    /// Total hop time; infinite if relays are too close.
+    /// Total hop time of the current chain, which is to be minimised. Infinite if relays are too close.
     time: f32,
-    /// Total hop time before the current round.
+    /// Total hop time of the chain before the current round of passes.
     before: f32,
-    /// Total hop time of the best chain; 0 at first.
+    /// Total hop time of the best chain found; 0 until a chain is found.
     best: f32,
-    /// Sums of hop times, toward Rx and back.
+    /// Sum of all hop times of the solved chain, toward Rx and back to Tx.
     sums: [f32; 2],
     worst: f32,
 }
 
 impl<const RELAYS: usize> Fitted<RELAYS> {
-    /// State before the first call: all bytes 0, no flash.
+    /// State of the solver before its first call. All its bytes are 0, so it takes no flash.
     pub(super) const NEW: Self = Self {
         gains: Gains::NONE,
         places: [[0.0; 3]; RELAYS],
@@ -222,7 +227,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         worst: 0.0,
     };
 
-    /// Continues by one portion; `Ready` with the linear worst SIR.
+    /// Continues the solution by one bounded portion. `Ready` once the chain is solved, with the linear SIR of the
+    /// worst hop.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let relays = chain.relays();
         match self.work {
@@ -257,7 +263,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    /// Places up to [`OTHERS_AT_ONCE`] relays after the first `done`.
+    /// Moves relays to their positions in the current initial chain. They are up to [`OTHERS_AT_ONCE`] relays after the
+    /// first `done`. The first pass over the chain follows after the last relay.
     fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
         let relays = chain.relays();
@@ -311,7 +318,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns node `index` moved by `by`, inside its limits. 0 is Tx, N + 1 is Rx.
+    /// Returns the position of node `index`, moved along the current coordinate by `by`. The node stays within its
+    /// limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
@@ -379,7 +387,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         self.work = Work::Pass(end);
     }
 
-    /// Continues after the best moves take the time `time`.
+    /// Continues after a pass whose best combination of moves has the total hop time `time`. The last relay is in
+    /// `state`.
     fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
@@ -389,7 +398,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Moves relays to their best positions, from `index` toward Tx.
+    /// Moves relays to their best positions, from relay `index` (which is in `state`) toward Tx.
     fn back(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, state: u8) {
         let end = index.saturating_sub(OTHERS_AT_ONCE);
         let mut state = usize::from(state);
@@ -407,7 +416,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the next coordinate, step width or initial chain.
+    /// Selects the coordinate and the step width of the next pass over the relays. A pass changes one coordinate of all
+    /// relays. After the last pass from an initial chain, the function stores the chain if it is the best so far, and
+    /// goes on to the next initial chain.
     fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;
@@ -439,7 +450,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns both hop times to node `index`; lowers `worst`.
+    /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the lower SIR of the hop.
     fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
@@ -455,7 +466,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of hop `hop`'s slot to Rx, and begin of its slot back. Hop 0 gives 0 and 1.
+    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are fractions of the
+    /// frame. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {
@@ -471,7 +483,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         [end.min(middle), 1.0 - share(back)]
     }
 
-    /// Returns the solved position and slots of relay `index`.
+    /// Returns the position of relay `index`, and its slots, once the chain is solved.
     pub(super) fn place(
         &self,
         chain: &Chain<'_, impl SeatOf>,
@@ -499,7 +511,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains.
+/// Returns the number of initial chains. More chains are tried if several lateral offsets or altitudes are allowed.
 fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {
@@ -515,7 +527,7 @@ impl Gains {
         in_noise(square(x) + square(y) + square(h), self.noise)
     }
 
-    /// Returns the hop to node `index`, 1 to N + 1.
+    /// Returns the hop to node `index`, 1 to N + 1 (Rx).
     fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Hop {
         let (config, relays) = (chain.mission.config(), chain.relays());
         let is_between = index > 1 && index <= relays;

@@ -1,49 +1,51 @@
 //! Reach of a hop with its first and second derivatives.
 //!
-//! A hop leads from p to p', with c = gamma / A, the ratio of target and sender's gain, and the interferer at m. At its
-//! maximum length
+//! A hop leads from p to p', with c = gamma / A, the ratio of target and sender's gain, and the interferer at m. At its maximum
+//! length
 //!
 //! ```text
 //! 2 F = q(|p' - m|^2) - c |p' - p|^2 = 0,    q(s) = s / (1 + nu s)
 //! ```
 //!
-//! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2,
-//! p_3, w_2, w_3). With v = p' - m, w = 1 + nu s, q' = 1 / w^2 and q'' = -2 nu / w^3, the derivatives of F by p' are
-//! F_i = q' v_i - c (p' - p)_i and F_ij = (q' - c) [i = j] + 2 q'' v_i v_j; those by p are c (p' - p)_i and -c [i = j],
-//! and the mixed ones c [i = j]. Without noise q' is 1 and q'' is 0, so F is quadratic. Those of R follow by
-//! differentiating F(R(z), z) = 0 once and twice, with a = -dF/dp'_1 = -q' v_1 + c (p' - p)_1:
+//! and one coordinate of p' follows from the other two, w, and from p (see [`Coordinate`]): p'_1 = R(z), z = (p_1, p_2, p_3, w_2,
+//! w_3). With v = p' - m, w = 1 + nu s, q' = 1 / w^2 and q'' = -2 nu / w^3, the derivatives of F by p' are F_i = q' v_i - c (p' -
+//! p)_i and F_ij = (q' - c) [i = j] + 2 q'' v_i v_j; those by p are c (p' - p)_i and -c [i = j], and the mixed ones c [i = j].
+//! Without noise q' is 1 and q'' is 0, so F is quadratic. Those of R follow by differentiating F(R(z), z) = 0 once and twice,
+//! with a = -dF/dp'_1 = -q' v_1 + c (p' - p)_1:
 //!
 //! ```text
 //! R_z = F_z / a,    R_zz' = (F_zz' + F_1z R_z' + R_z F_1z' + F_11 R_z R_z') / a
 //! ```
 //!
-//! The derivative by ln gamma is -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` compares them with an
-//! independent optimiser.
+//! The derivative by ln gamma is -c |p' - p|^2 / 2a. `host-tests/tests/joint_method/main.rs` compares them with an independent
+//! optimiser.
 //!
 //! # Coordinates
 //!
-//! The possible ends of a hop form a surface; beyond it the signal is too weak. Along most of a chain x is a smooth
-//! function of y and h on it; where the chain climbs vertically, or goes sideways, h or y is the dependent coordinate.
+//! The possible ends of a hop form a surface; beyond it the signal is too weak. Along most of a chain x is a smooth function of y
+//! and h on it; where the chain climbs vertically, or goes sideways, h or y is the dependent coordinate.
 //!
 //! # Noise
 //!
 //! With noise a hop is replaced by a noise-free hop that equals it near one distance from the interferer.
 //!
-//! q(s) = s / (1 + nu s) is concave, so with w = 1 + nu t its tangent at s = t is above it: q(s) <= (s + nu t^2) / w^2.
-//! Hence
+//! q(s) = s / (1 + nu s) is concave, so with w = 1 + nu t its tangent at s = t is above it: q(s) <= (s + nu t^2) / w^2. Hence
 //!
 //! ```text
 //! q(s) >= c l   =>   s + nu t^2 >= c w^2 l
 //! ```
 //!
-//! and the right side is a noise-free hop for the target c' = c w^2 with the margin nu t^2. For c' > 1 its reach is a
-//! ball, and one coordinate of the end follows from the other two by a square root. The ball contains all valid ends,
-//! and touches their surface where s = t; iterating t is Newton's method in s.
+//! and the right side is a noise-free hop for the target c' = c w^2 with the margin nu t^2. For c' > 1 its reach is a ball, and
+//! one coordinate of the end follows from the other two by a square root. The ball contains all valid ends, and touches their
+//! surface where s = t; iterating t is Newton's method in s.
 
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end of a hop that just meets its target. w are its free coordinates, p is the start.
+/// Derivatives of the end of a hop that just meets its target SIR.
+///
+/// Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w, of the hop's start
+/// p, and of the target SIR.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -53,16 +55,20 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives by w_i (rows) and p.
+    /// Second derivatives of the dependent coordinate of the hop's end by w and p. w are the other two coordinates of
+    /// the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value for each coordinate
+    /// of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives: w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end. They are by the other two coordinates w_1 and
+    /// w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate by ln(target SIR), m.
+    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m. The other two coordinates are
+    /// constant.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// Derivatives of a hop whose end is fixed: all 0.
+    /// Derivatives of a hop whose end is fixed: all are 0. The end is fixed at the x of Rx or at the hop's farthest x.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -72,7 +78,11 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Returns the derivatives; all points have the dependent coordinate first. [`Reach::FIXED`] at the rim.
+    /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`.
+    ///
+    /// In all three points the dependent coordinate of the hop's end comes first. `c` is the target SIR divided by
+    /// the gain. `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. At the rim of the
+    /// positions that meet the target no coordinate depends on the others; the result is then [`Reach::FIXED`].
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -121,7 +131,10 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of `q(s) = s / (1 + nu s)`.
+/// Derivatives q'(s) and 2 q''(s) of the inverse of interference plus noise, q(s) = s / (1 + nu s).
+///
+/// s is the squared distance from the interferer, m^2, and q has the same unit. nu is the noise divided by the
+/// interferer's power received at 1 m, 1/m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -150,11 +163,11 @@ pub(crate) enum Coordinate {
     H,
 }
 
-/// Values for x, y and h: a position, m, or derivative.
+/// Vector with one component for each of the coordinates x, y and h: a position, m, or a derivative.
 pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
-    /// Returns (x, y, h) with the coordinate `self` first.
+    /// Returns (x, y, h) reordered: the coordinate `self` first, then the other two in their order.
     #[inline(never)] // called from many places
     pub(crate) const fn first(self, at: Triple) -> Triple {
         self.ordered(at)
@@ -166,12 +179,13 @@ impl Coordinate {
         self.restored(at)
     }
 
-    /// Returns a symmetric matrix with the coordinate `self` first.
+    /// Returns a symmetric 3 x 3 matrix with reordered rows and columns. The coordinate `self` is first; the other two
+    /// follow in the order x, y, h.
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.ordered(bend).map(|row| self.first(row))
     }
 
-    /// Restores a matrix; the inverse of [`Coordinate::first_of`].
+    /// Restores a matrix to rows and columns (x, y, h); the inverse of [`Coordinate::first_of`].
     pub(crate) fn back_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.restored(bend.map(|row| self.back(row)))
     }
@@ -201,14 +215,16 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition `s + spare >= c l` for a hop to meet its target. s: squared distance receiver to interferer, l: squared
-/// length, m^2. `c`: target divided by gain, raised by noise.
+/// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s is the squared distance from the hop's receiver
+/// to the interferer, m^2, and l the squared length of the hop, m^2. `c` is the target divided by the gain; noise makes
+/// it larger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
-    /// Difference `c - 1`, without cancellation.
+    /// Difference `c` - 1, computed without cancellation. `c` is the target SIR divided by the gain, increased by
+    /// noise.
     pub(super) e: f32,
-    /// Constant of the condition, m^2; 0 without noise.
+    /// Constant in the condition s + `spare` >= `c` l of [`Tangent`], m^2; 0 without noise.
     pub(super) spare: f32,
 }
 
@@ -217,7 +233,11 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the condition with noise, linearised at `s`, m^2. `e` is `c - 1`, without cancellation.
+    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is the squared
+    /// distance from the hop's receiver to the interferer, m^2. The result has the form of a condition without noise.
+    ///
+    /// `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. `c` is the target SIR divided
+    /// by the gain, and `e` is c - 1.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

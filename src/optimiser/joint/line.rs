@@ -15,10 +15,10 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use core::task::Poll;
 
-/// Relays per call: one direction, both.
+/// Number of relays per call: with data in one direction, and in both.
 const AT_ONCE: [u16; 2] = [20, 2];
 
-/// Memory of a relay in Algorithm 1: lengths in m.
+/// Memory of a relay during Algorithm 1: its x, and the upper limit of its x, m.
 pub(super) trait Noted {
     fn lengths_m(&mut self) -> &mut [f32; 2];
 }
@@ -29,18 +29,20 @@ impl Noted for [f32; 2] {
     }
 }
 
-/// Progress of Algorithm 1: to Rx, then back.
+/// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Last computed relay; 0 at start and end.
+    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx and at the end of the pass
+    /// back.
     index: u16,
-    /// True on the way from Rx back to Tx.
+    /// True while the solver passes along the chain from Rx back to Tx.
     is_back: bool,
-    /// True if some relay cannot take its farthest x, or both directions count.
+    /// True if some relay has to stay short of its farthest x, or if data flow in both directions.
     holds_back: bool,
-    /// x of relay `index`, m: farthest, or final on the way back.
+    /// x of relay `index`, m. In the pass to Rx it is the farthest x that meets the target; in the pass back it is
+    /// the final x.
     x_m: f32,
-    /// Largest x with room for later relays, m.
+    /// Upper limit of the x of relay `index`, m, which leaves the relays after it their separation.
     end_m: f32,
 }
 
@@ -53,8 +55,12 @@ impl Line {
         end_m: 0.0,
     };
 
-    /// Continues Algorithm 1 for `sigma`, in ln(SIR); `None` if it is missed. True if some relay cannot take its
-    /// farthest x.
+    /// Continues Algorithm 1 by some relays, for the target `sigma`, in ln(SIR). Ready with `None` if the target cannot
+    /// be met. Otherwise ready with true if some relay has to stay short of its farthest x, else false.
+    ///
+    /// `cells` has the lateral offsets and altitudes, and `notes` receives the x. Relay 1 stays at least the first of
+    /// `closed` away from Rx, and the last relay at least the second away from Tx, as fractions of the distance from Tx to
+    /// Rx.
     pub(super) fn step<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -85,7 +91,8 @@ impl Line {
         Poll::Pending
     }
 
-    /// Computes the next farthest x toward Rx; `None` if missed. For the last relay it is final.
+    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay the result is its
+    /// final x. `None` if the target cannot be met.
     fn there<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -124,7 +131,7 @@ impl Line {
         Some(())
     }
 
-    /// Computes the final x before `index`; `None` if missed.
+    /// Computes the final x of the relay before relay `index`, which is at `x_m`. `None` if `target` cannot be met.
     fn back<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -145,7 +152,8 @@ impl Line {
     }
 }
 
-/// Returns the hop to `index`, exactly as that relay computes it.
+/// Returns the hop to relay `index`, computed exactly as the relay computes it. The x of the hop's end is at most
+/// `end_m`, m.
 fn hop<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,
@@ -171,7 +179,8 @@ fn hop<const RELAYS: usize>(
     .ending(end_m)
 }
 
-/// Returns the slack and the final x of the last relay, m.
+/// Returns the chain's slack, m, and the final x of the last relay, m. `reaches` are the farthest x of the last two
+/// relays, m, and `end_m` is the upper limit of the last relay's x.
 fn ending<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,
@@ -211,7 +220,7 @@ fn ending<const RELAYS: usize>(
 }
 
 impl<const RELAYS: usize> Cells<RELAYS> {
-    /// Returns the minimum step in x before relay `index`, m.
+    /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
     pub(super) fn least_step(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         if index <= 1 {
             return 0.0;
@@ -221,7 +230,7 @@ impl<const RELAYS: usize> Cells<RELAYS> {
         chain.mission.step_with_room(across)
     }
 
-    /// Returns the largest x with room for later relays, m.
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
     pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
         let first = chain.distance_m() - steps.clone().sum::<f32>();

@@ -32,5 +32,5 @@ pub use chain::Seat;
 pub use site::Room;
 pub use solver::Solver;
 
-/// Maximum number of relays; 0 without the feature `altitude`.
+/// Maximum number of relays for which the joint method works; 0 without the feature `altitude`.
 pub const MOST_SOLVED: usize = if ALTITUDE { 100 } else { 0 };

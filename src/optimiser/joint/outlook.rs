@@ -12,23 +12,29 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function: the slack as a quadratic in a position.
+/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. It assumes that the
+/// relays toward Rx react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// First derivatives of the slack by x, y, h, m/m.
+    /// First derivatives of the slack with respect to the relay's x, y and h, m per m.
     pub(crate) slope: Triple,
-    /// Second derivatives of the slack by x, y, h, 1/m.
+    /// Second derivatives of the slack with respect to the relay's x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// Derivative of the slack by ln(target SIR), m.
+    /// Derivative of the slack with respect to the target ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of the moves' slack `a f + b f^2`, m. f is the fraction of the moves, 0 to 1.
+    /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f, 0 to 1, is the fraction of their
+    /// computed moves that this relay and the relays toward Rx make.
     pub(crate) linear: f32,
-    /// Coefficient b of the moves' slack `a f + b f^2`, m.
+    /// Coefficient b of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of the moves, as for
+    /// `linear`.
     pub(crate) square: f32,
 }
 
 impl Outlook {
-    /// Returns the slack, `reach_m` minus the last hop's length, and its derivatives. An x beyond Rx counts as Rx's.
+    /// Returns the slack of a chain whose last relay is at `at`, m, and its derivatives.
+    ///
+    /// The slack is `reach_m`, the maximum length of the last hop, minus the length of this hop. Rx is at x =
+    /// `distance_m`; an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -51,7 +57,9 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty `weight near^2 / 2`. `near` is the missing squared distance from the interferer, m^2.
+    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the squared
+    /// distance that the relay lacks, m^2. `slope` and `by_target` are the derivatives of `near` by the position and by
+    /// ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -65,8 +73,9 @@ impl Outlook {
         }
     }
 
-    /// Becomes the sender's value function; returns the receiver's move. It is within [`low`, `high`], m, relative to
-    /// now.
+    /// Replaces the value function of a hop's receiver by its sender's; returns the receiver's policy. The policy is a
+    /// move in two coordinates, within [`low`, `high`], m, relative to the present position. The third coordinate,
+    /// `axis`, follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -127,7 +136,7 @@ impl Outlook {
     }
 }
 
-/// Returns a + b f.
+/// Returns the vector a + b f, with the number f.
 fn add(a: Triple, b: Triple, f: f32) -> Triple {
     let mut sum = a;
     for (cell, b) in sum.iter_mut().zip(b) {
@@ -136,7 +145,7 @@ fn add(a: Triple, b: Triple, f: f32) -> Triple {
     sum
 }
 
-/// Returns a + (b f + c g).
+/// Returns the vector a + (b f + c g), with the numbers f and g.
 fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     let mut sum = a;
     for ((cell, b), c) in sum.iter_mut().zip(b).zip(c) {
@@ -145,24 +154,30 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     sum
 }
 
-/// Move of a relay in two coordinates; the third follows. It is linear in the sender's move.
+/// Policy of a relay in the joint method: its move in one iteration, in two of its coordinates.
+///
+/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on the move
+/// of the sender, the next node toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True to select the larger solution for the third coordinate.
+    /// True to select the larger of two solutions for the relay's third coordinate.
     pub(super) rising: bool,
-    /// Move if the sender stays, m.
+    /// Move of the relay in its two free coordinates while the sending relay does not move, m.
     pub(super) step: [f32; 2],
-    /// Change of the move per metre of the sender's.
+    /// Change of the relay's move in each free coordinate per metre of the sender's move. The three numbers of a triple
+    /// are for the sender's move along x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature relative to the largest; less would be rounding.
+/// Minimum curvature of the value function, divided by its largest curvature. A smaller curvature would be a rounding
+/// error.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// Returns the best move within [`low`, `high`], m. `bend` (yy, yh, hh) is made concave. `across` has the mixed
-    /// derivatives with the sender.
+    /// Returns the policy that maximises a quadratic function of the relay's two free coordinates. The relay's move
+    /// is within [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh,
+    /// hh), which are made concave. `across` has the mixed derivatives with respect to the sending relay's position.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],
@@ -222,7 +237,10 @@ impl Policy {
         policy
     }
 
-    /// Returns the move in the two free coordinates, m. It is `share` of the own step, plus the reaction to `change`.
+    /// Returns the relay's move in its two free coordinates, m. The third coordinate follows from the hop.
+    ///
+    /// The move is the fraction `share` of the relay's own step, plus the reaction to `change`, the move of the
+    /// previous relay in x, y and h, m.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;
@@ -231,7 +249,8 @@ impl Policy {
     }
 }
 
-/// Returns the symmetric matrix with positive eigenvalues negated.
+/// Returns the symmetric matrix (yy, yh, hh) with positive eigenvalues negated. A quadratic function with these
+/// second derivatives has a maximum.
 fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     let (mean, half) = (0.5 * (yy + hh), 0.5 * (yy - hh));
     let root = sqrt(square(half) + square(yh));
@@ -251,7 +270,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     [mean + half * cos, half * sin, mean - half * cos]
 }
 
-/// Compressed [`Policy`]: each derivative has three decimal digits.
+/// Compressed [`Policy`] (a relay's move). Each derivative is stored with three decimal digits, which is accurate enough.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Brief {
     axis: Coordinate,
@@ -293,7 +312,7 @@ impl Brief {
     }
 }
 
-/// Returns the upper half of an f32: three decimal digits.
+/// Compresses a finite f32 to 16 bits, which keep about three decimal digits; `widened` restores it.
 pub(super) const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

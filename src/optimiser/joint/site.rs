@@ -13,23 +13,24 @@ use crate::place::{CrossSection, Placement};
 use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
-/// Used part of a hop's squared maximum length; the rest covers rounding.
+/// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation; covers rounding.
+/// Factor on the minimum separation in the joint method. Rounding then cannot violate the true separation.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Newton steps for a hop with noise (see [`Tangent`]).
+/// Number of Newton steps in the computation of a hop with noise. Each step linearises the hop's condition at the
+/// result of the previous step (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Number of bisection steps of [`Site::halved`].
+/// Number of bisection steps of [`Site::halved`], which finds the farthest point that a hop reaches.
 const HALVINGS: u8 = 12;
 
-/// Relay to be placed, with the sender of its hop.
+/// Relay to be placed by the joint method, with the sender of the hop to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
-    /// Noise divided by the interferer's power at 1 m, 1/m^2.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,
@@ -39,7 +40,8 @@ pub(crate) struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    /// Creates the relay to be placed; `first` if `sender` is Tx.
+    /// Creates the relay to be placed, which receives from `sender`; `first` is true if the sender is Tx. `room` has
+    /// the permitted lateral offsets and altitudes of the relay.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -67,8 +69,10 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position of largest x that meets `target`, if any. It is at `wanted`, or as close as the hop
-    /// reaches.
+    /// Returns the position of largest x that meets `target` with the lateral offset and altitude `wanted`.
+    ///
+    /// The sender is at x = `from_m`. If the hop cannot reach `wanted`, the closest lateral offset and altitude that
+    /// it can reach are used. `None` if no hop meets the target. The x is at most the x of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -79,7 +83,8 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the largest x that meets `target` at `at`, if any.
+    /// Returns the position of largest x that meets `target` at the lateral offset and altitude `at`. `None` if there
+    /// is none. The sender is at x = `from_m`.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -91,9 +96,12 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns what the hop reaches closest to `wanted`, not before the sender. `None` if nothing permitted is reached.
-    /// The search is straight, from near the middle of the reach. With `c = target / gain > 1` the reach is a ball:
-    /// centre `p + (p - m) / (c - 1)`, radius `sqrt(c) |p - m| / (c - 1)`, sender p, interferer m.
+    /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
+    ///
+    /// The x of the hop's end must not be smaller than the x of the sender. The search goes along a straight line to
+    /// `wanted`. It starts at the permitted position closest to the middle of the reachable positions. `None` if no
+    /// permitted position is reached. With the sender at p, the interferer at m and c = target / gain > 1 the reachable
+    /// positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -106,8 +114,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle that the hop reaches at x >= `x_m`. It is centre and squared radius, m^2; `None` if `c` is at
-    /// most 1: no limit.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is its centre
+    /// and squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
     fn disk(
         &self,
         target: f32,
@@ -158,7 +166,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest reachable position toward `wanted`, by bisection.
+    /// Returns the farthest position that the hop reaches on the way to `wanted`, found by bisection. The way is
+    /// straight in lateral offset and altitude, and starts at those of the sender.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -174,8 +183,10 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Returns the wanted lateral offset and altitude after a move. `share` is the part of the move; the sender has
-    /// moved by `change`.
+    /// Returns the relay's new lateral offset and altitude after a fraction of its computed move.
+    ///
+    /// `policy` gives the move, and `share` the fraction. The sender has already moved by `change` to `from`, but the
+    /// relay is still at `nominal`. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -220,7 +231,10 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the third coordinate that just meets `target`, m. `at` are the other two, as chosen by `policy`.
+    /// Returns the third coordinate of the relay, m, at which the hop from `from` just meets `target`.
+    ///
+    /// `at` are the relay's two free coordinates, m; `policy` states which two. `None` if no position with these two
+    /// coordinates just meets the target.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {
@@ -249,7 +263,9 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Returns the first coordinate at the hop's maximum length, m. `rising` selects the larger of two solutions.
+/// Returns the coordinate of a hop's end at which the hop just meets its target, m. The triples have this coordinate
+/// first; `a` and `b` are the other two coordinates of the end. If there are two solutions, `rising` selects the larger
+/// solution. `None` without a solution.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -275,8 +291,9 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns where the line from `best` to `wanted` leaves a circle. `None` if `best` is outside. `rim` is the squared
-/// radius, m^2.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. `None` if `best` is outside of the
+/// circle. The points are lateral offsets and altitudes. `middle` is the circle's centre, and `rim` its squared radius,
+/// m^2.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -300,14 +317,14 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude, three bytes each.
+/// Stored lateral offset and altitude of one relay. Each has three bytes, as a fraction of the allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
 impl Cell {
     pub(super) const NONE: Self = Self([0; 6]);
 
-    /// Encodes `at`, limited to `room`.
+    /// Encodes the lateral offset and altitude `at` for storage, limited to `room`, the allowed ranges.
     pub(super) fn of(at: CrossSection, room: Room) -> Self {
         let [a, b, c, _] = code(at.y_m, room.lateral).to_le_bytes();
         let [d, e, f, _] = code(at.altitude_m, room.band).to_le_bytes();
@@ -323,7 +340,7 @@ impl Cell {
     }
 }
 
-/// Stored lateral offsets and altitudes of all relays.
+/// Stored lateral offsets and altitudes of the relays of a chain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cells<const RELAYS: usize>([Cell; RELAYS]);
 
@@ -370,14 +387,14 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {
-    /// Range of lateral offsets, m.
+    /// Range of the permitted lateral offsets, m.
     pub lateral: Band,
-    /// Range of altitudes, m.
+    /// Range of the permitted altitudes, m.
     pub band: Band,
 }
 
 impl Room {
-    /// Returns what the mission allows.
+    /// Returns the lateral offsets and altitudes that the mission allows.
     pub const fn of(mission: &Mission) -> Self {
         let config = mission.config();
         Self {
@@ -386,7 +403,7 @@ impl Room {
         }
     }
 
-    /// Returns these lateral offsets with the single altitude `altitude_m`.
+    /// Returns these lateral offsets with `altitude_m` as the only allowed altitude.
     pub const fn at_altitude(self, altitude_m: f32) -> Self {
         Self {
             band: Band::at(altitude_m),
@@ -394,7 +411,7 @@ impl Room {
         }
     }
 
-    /// Returns the largest lateral offset away from the interferer, m.
+    /// Returns the limit of the lateral offset, m, on the side of the line Tx to Rx without the interferer.
     pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
         if interferer.y_m > 0.0 {
             self.lateral.least_m
@@ -403,7 +420,7 @@ impl Room {
         }
     }
 
-    /// Returns the permitted lateral offset and altitude nearest to `at`.
+    /// Returns the allowed lateral offset and altitude that are nearest to `at`.
     #[inline(never)] // called from many places
     pub const fn nearest(self, at: CrossSection) -> CrossSection {
         CrossSection {
@@ -413,15 +430,20 @@ impl Room {
     }
 }
 
-/// Factor that leaves the end relays a choice of position.
+/// Factor from the maximum SIR of the first or last hop to the upper bound of the chain's SIR. The margin leaves the
+/// first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
-/// Bisection steps for the best first hop with noise.
+/// Number of bisection steps for the position with the largest SIR of a first hop with noise.
 const END_HALVINGS: u8 = 24;
 
-/// Returns the maximum SIR of the first hop, times [`LITTLE`]. The best relay is opposite the interferer, at t times
-/// its distance from Tx. The slope has the sign of `h^2 - t (B + U) - t^2 U - nu t s^2`, `s = B + (1 + t)^2 U + h^2`;
-/// it falls with t. U and B are the squared distances Tx to interferer, along and across that direction.
+/// Returns the maximum SIR of the first hop, less a margin that leaves the relay a choice of position. `room` has the
+/// allowed lateral offsets and altitudes.
+///
+/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are the
+/// squared distances from Tx to the interferer along that direction and perpendicular to it; h is the altitude, and nu
+/// the noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
+/// which falls with t. So with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -447,7 +469,8 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// Returns the maximum SIR of the hop to Rx, less a margin.
+/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, less a margin. `room` has the permitted
+/// lateral offsets and altitudes of the relay.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
         .nearest(CrossSection::default())
@@ -455,19 +478,28 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Weight of a violated separation, in Tx-Rx distances. No increase of slack outweighs it.
+/// Weight of the penalty for a violated minimum separation, in distances from Tx to Rx. It is so large that no gain of
+/// slack is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance that counts as at a limit, in Tx-Rx distances.
+/// Distance from a limit of its range within which a relay counts as at the limit. The unit is the distance from Tx to
+/// Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference up to which a length counts as maximum. For hops that end at Rx's x.
+/// Relative difference up to which the squared length of a hop counts as its maximum. It is for hops that end at the x
+/// of Rx. With a larger difference the hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the penalty terms of a relay too near the interferer. Missing squared distance, m^2, 0 if far enough;
-    /// weight; derivative by ln(target). A hop p to p' near the interferer m is too short if
-    /// `|p' - p|^2 = q(|p' - m|^2) / c < d_min^2`. That is `|p' - m|^2 < L / (1 - nu L)`, `L = c d_min^2`.
+    /// Returns the penalty terms of a relay at `to` that may be too near the interferer.
+    ///
+    /// The first number is the squared distance that the relay lacks, m^2; 0 if it is far enough away. The second is
+    /// the weight of the penalty. The third is the derivative of the first by ln(target SIR).
+    ///
+    /// `c` is the target SIR divided by the sender's gain. A hop of maximum length from p to p' that ends near the
+    /// interferer at m is short. It violates the minimum separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2,
+    /// with the inverse q of interference plus noise. With the noise nu that is so if |p' - m|^2 < L / (1 - nu L) for L
+    /// = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
@@ -482,14 +514,18 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty near the interferer, m; reduces the slack.
+    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if it is far enough away. The chain's
+    /// slack is reduced by the penalty.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
     }
 
-    /// Computes the relay's move, and its sender's value function. The move is at most `trust` times the distance from
-    /// the interferer.
+    /// Computes the policy (the move) of the relay at `to`, and the value function of its sender at `from`.
+    ///
+    /// `outlook` is the value function of the relay, and becomes the value function of the sender. The move is
+    /// limited to `trust` times the relay's distance from the interferer. Work: some 400 multiplications and two
+    /// square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -543,7 +579,11 @@ impl Site<'_> {
         }
     }
 
-    /// Selects the dependent coordinate, within its limits, and dF by it. F is half the hop's margin (see `hop`).
+    /// Selects the coordinate of the hop's end that is computed from the other two.
+    ///
+    /// It is not at a limit of its permitted range, `low` to `high`, and F changes most with it; x is preferred. F is
+    /// half the margin of the hop to its target: 0 for a hop of maximum length (see `hop`). The second result is the
+    /// derivative of F by the selected coordinate.
     fn axis(
         &self,
         c: f32,

@@ -14,25 +14,39 @@ use crate::sir::square;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
-    /// Parabola: lateral offset and height of its middle, in half Tx-Rx distances.
+    /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and height of its middle,
+    /// in units of half the distance from Tx to Rx.
     Arch { aside: f32, up: f32 },
-    /// Spiral about the interferer through a point in direction (`aside`, `up`). `far` is its distance divided by
-    /// `sqrt(r_Tx r_Rx)`, those of Tx and Rx.
+    /// Initial chain on a spiral about the interferer. The spiral leads from Tx to Rx through a position P right
+    /// above or beside the interferer.
+    ///
+    /// `aside` and `up` are the direction from the interferer to P. `far` is the distance of P from the interferer,
+    /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
-    /// Parabola without a separation. Hops are as in flight.
+    /// Initial chain on a parabola as for `Arch`, but without a minimum separation. The solver then searches the
+    /// highest target of this chain. It computes the hops exactly as the relays do in flight, and a relay is allowed to
+    /// stay short of its farthest position.
     Through { aside: f32, up: f32 },
-    /// Parabola, seen from above, through the fixed altitudes; `aside` as in `Arch`. Outside them they stay if `level`,
-    /// else fall.
+    /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
+    /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
+    /// altitudes of the other relays are interpolated between the fixed altitudes.
+    ///
+    /// If `level` is true, the altitude stays constant from the outermost fixed relay to Tx or Rx. If it is false,
+    /// the altitude falls to the lowest permitted altitude at Tx and at Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Zigzag, for relays that do not fit one behind the other.
+    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation.
+    ///
+    /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position one
+    /// separation beside it. The corner is at the highest altitude, on the side away from the interferer.
     Turns,
-    /// Chain at the lowest altitude, for a very high target.
+    /// Initial chain at the lowest altitude, for a target so high that no hop can pass the interferer.
     Near,
-    /// Relay 1 at Rx's x, high or far beside it.
+    /// Initial chain with relay 1 at the x of Rx, high above Rx or far to the side of Rx. The lateral offsets and
+    /// altitudes of the other relays lead from there in equal steps to the line Tx-Rx and the lowest altitude.
     Far,
 }
 
-/// Parabolas: `aside` and `up` as in [`Start::Arch`].
+/// Parabolas that are tried as initial chains: `aside` and `up` of each, as in [`Start::Arch`].
 const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
@@ -43,10 +57,10 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of [`ARCHES`] that are also tried without a separation.
+/// Number of entries of [`ARCHES`], from the first, that are also tried without a separation.
 const THROUGH: usize = 3;
 
-/// Chains with fixed altitudes; see [`Start::FixedAltitudes`].
+/// Initial chains for relays with fixed altitudes among them; see [`Start::FixedAltitudes`].
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -56,7 +70,7 @@ const HELD: [(f32, bool); 6] = [
     (0.25, true),
 ];
 
-/// Spirals: `aside`, `up` and `far` as in [`Start::Around`].
+/// Spiral initial chains: `aside`, `up` and `far` of each, as in [`Start::Around`].
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
     (1.0, 0.0, 1.0),
@@ -69,11 +83,11 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral: ln(radius) is linear in the angle.
+/// Spiral about the interferer: the logarithm of the distance from it changes linearly with the angle.
 struct Way {
     to: Triple,
     angle: f32,
-    /// Change of ln(radius) from start to end.
+    /// Logarithm of the distance from the interferer at the spiral's end, minus that at its start.
     rise: f32,
     length: f32,
 }
@@ -95,7 +109,8 @@ impl Way {
         }
     }
 
-    /// Returns the end of a hop along the spiral. Its length is `step` times its end's radius.
+    /// Returns the end of a hop along the spiral from `here`; both points are relative to the interferer. The hop's
+    /// length is `step` times the distance of its end from the interferer.
     fn after(&self, here: Triple, step: f32) -> Triple {
         let bend = 0.5 * step * self.rise / self.length;
         let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
@@ -110,10 +125,10 @@ impl Way {
     }
 }
 
-/// Minimum divisor, against a division by 0.
+/// Minimum divisor in the computation of a spiral, which prevents a division by 0.
 const SHORTEST: f32 = 1e-6;
 
-/// Maximum tangent of a hop's angle about the interferer.
+/// Maximum tangent of the angle by which one hop of a spiral turns about the interferer.
 const MOST_TURN: f32 = 1.5;
 
 fn length([x, y, z]: Triple) -> f32 {
@@ -121,7 +136,10 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns a relay's lateral offset and altitude on a spiral.
+    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer.
+    ///
+    /// The hop to this relay comes from `from`. `c` is the target SIR divided by the sender's gain; it determines the
+    /// length of the hop. `room` has the permitted ranges.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -154,7 +172,8 @@ impl Start {
         })
     }
 
-    /// Returns relay `index`'s lateral offset and altitude in a zigzag.
+    /// Returns the lateral offset and altitude of relay `index` in a zigzag chain. Neighbours differ by `apart_m` in
+    /// the lateral offset; `room` has the allowed ranges.
     pub(super) fn in_turn(
         index: u16,
         interferer: &Interferer,
@@ -179,7 +198,8 @@ impl Start {
         })
     }
 
-    /// Returns initial chain `number`; `Some(None)` if it does not fit. `None` past the last.
+    /// Returns the initial chain `number` for relays limited to the lateral offsets and altitudes `room`. `None` if
+    /// there is no chain with this number; `Some(None)` if the chain does not fit into `room`.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -221,7 +241,8 @@ impl Start {
         }
     }
 
-    /// Returns a relay's lateral offset and altitude in this chain.
+    /// Returns the lateral offset and altitude of a relay in this initial chain. The previous relay is at x = `x_m`;
+    /// `distance_m` is the distance from Tx to Rx, and `room` has the allowed ranges.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
             Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
@@ -237,10 +258,11 @@ impl Start {
     }
 }
 
-/// Bisection for the highest feasible target, in ln(SIR).
+/// Bisection for the highest feasible target SIR of a chain, in ln(SIR).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest feasible target, ln(SIR). True if some relays cannot take their farthest x.
+    /// Highest target found feasible, in ln(SIR); `None` until a target is found. The `bool` is true if some relays
+    /// have to stay short of their farthest x to meet this target.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -250,7 +272,8 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward to the precision `width`, in ln(SIR). Each step is `growth` times the last.
+    /// Creates a search downward from the target `sigma`, in ln(SIR), to the precision `width`. The first step is
+    /// `step`; each further step is `growth` times the previous one.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -262,7 +285,9 @@ impl Seek {
         }
     }
 
-    /// Creates a search upward to the precision `width`, in ln(SIR). Each step is three times the last.
+    /// Creates a search upward from the feasible target `sigma`, in ln(SIR), to the precision `width`. The first step
+    /// is `step`; each further step is three times the previous one. `holds_back` is true if some relays have to stay
+    /// short of their farthest position to meet `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -274,8 +299,10 @@ impl Seek {
         }
     }
 
-    /// Records a tried target; true if another has to be tried. `met`: `None` if infeasible, true if some relays cannot
-    /// take their farthest x.
+    /// Records if the chain meets the target that was tried. Returns true if the search goes on with another target.
+    ///
+    /// `met` is `None` if the target is infeasible. Otherwise `met` is true if some relays have to stay short of
+    /// their farthest positions to meet the target.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -301,11 +328,12 @@ impl Seek {
         true
     }
 
-    /// Returns the highest feasible target, ln(SIR), if any. True if some relays cannot take their farthest x.
+    /// Returns the highest feasible target found, in ln(SIR); `None` if no target is feasible. The `bool` is true if
+    /// some relays have to stay short of their farthest position to meet this target.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }
 }
 
-/// Maximum step in ln(SIR); a longer one ends the search.
+/// Maximum step between two targets, in ln(SIR). The search ends when the next step would be longer.
 const MOST_STEP: f32 = 40.0;

@@ -7,7 +7,7 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, write};
 
-/// Hello: the sender's neighbour, received nodes, view and mission.
+/// Hello message: the sender's neighbour, the nodes that it receives, its view and its mission.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "eight flags of the wire format"
@@ -15,53 +15,59 @@ use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
-    /// [`digest`](crate::wire::digest::digest) of the mission loaded before flight.
+    /// [`digest`](crate::wire::digest::digest) of the sender's mission as loaded before flight.
     pub mission: u16,
-    /// Latest view known to the sender.
+    /// Identifier of the latest view known to the sender.
     pub latest_view: ViewId,
-    /// Sender's neighbour toward the destination; 0 for none.
+    /// Node number of the sender's neighbour on the destination's side of the sender; 0 for none.
     pub neighbour: u16,
-    /// True if the sender requests a hello.
+    /// True if the sender requests a hello in return.
     pub requests_reply: bool,
-    /// True if the sender requests a new view (members).
+    /// True if the sender requests a new view (agreed members of the chain).
     pub requests_view: bool,
-    /// True if the sender has restarted and joined nothing yet.
+    /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// Readiness of sender or destination.
+    /// Readiness of the sender or of the destination.
     ///
-    /// - Both in the chain: the sender fits in beside the destination.
-    /// - Sender outside: it would join.
-    /// - Destination outside: it is called to join.
+    /// - If both nodes are in the chain: true if the sender could be inserted between the destination and the neighbour
+    ///   that the destination has selected on the sender's side.
+    /// - If the sender is outside of the chain: true if it would join the chain when it is called.
+    /// - If the destination is outside of the chain: true if the destination is called to join.
     pub ready: bool,
-    /// Number of relays from the sender on: 1 to 1000.
+    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are the
+    /// connected relays from the sender to the end of the chain beyond it.
     pub behind: u16,
-    /// Nodes that the sender receives toward the destination. Bit i: number differs by i + 1.
+    /// Nodes that the sender receives on the destination's side. Bit i, 0 to 3, stands for the node whose number
+    /// differs from the sender's by i + 1.
     pub hears: u8,
-    /// Newest mission of the sender, loaded or uploaded.
+    /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,
-    /// True if the sender uses `latest_mission` now.
+    /// True if the sender uses the mission `latest_mission` now.
     pub active: bool,
-    /// True if all relays of the view use `latest_mission`.
+    /// True if all relays of the sender's view use `latest_mission`, a mission uploaded in flight.
     pub active_in_view: bool,
-    /// True if the sender or a relay beyond refuses `latest_mission`.
+    /// True if the sender, or a relay farther from the destination, refuses the mission `latest_mission`.
     pub refused: bool,
-    /// Flag for a node outside the chain.
+    /// Flag for a node outside of the chain.
     ///
-    /// - With `fresh`: the sender is outside, and no relay selects it.
-    /// - Without: the destination is outside an agreed view that is in place.
+    /// - With `fresh`, the sender is outside of the chain, and no relay selects it.
+    /// - Without `fresh`, the destination is outside of the chain. The chain has agreed on a view without it, and the
+    ///   relays of this view are in place.
     pub outside: bool,
-    /// Nonce for a mission offer; 0 to accept none.
+    /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,
 }
 
 impl Hello {
-    /// Returns true if `by` receives `of`, within four numbers.
+    /// Returns true if the sender of this hello, node `by`, receives node `of`. False for nodes more than four
+    /// numbers away.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes into `buffer`; returns the length, if it fits.
+    /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The eight flags share one
+    /// byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [
             self.requests_reply,
@@ -124,22 +130,26 @@ impl Hello {
     }
 }
 
-/// Claim of a node to its number, or another's echo. It detects two nodes with the same number.
+/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions along
+/// the chain, so that two nodes with the same number detect each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number; the larger wins. Raised at most once while active.
+    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim
+    /// number wins. A node draws it at its start, and raises it at most once while it is active.
     pub number: u32,
-    /// Other claim to the same number; 0 for none.
+    /// Last claim number received from another node with the claiming node's node number; 0 for none.
     pub other_number: u32,
-    /// True if the node is passive: another uses its number.
+    /// True if the claiming node is passive because another node uses its node number.
     pub passive: bool,
-    /// True for an echo of a claim to the destination's number.
+    /// True for an echo: the sender returns a claim to the destination's node number. If two nodes have this number,
+    /// both receive the echo. So each of them learns of the other's claim.
     pub echo: bool,
 }
 
 impl Claim {
-    /// Encodes into `buffer`; returns the length, if it fits. Flags from bit 0: passive, echo.
+    /// Encodes the claim into `buffer`; returns its length, or `None` if it does not fit. Its flags from bit 0:
+    /// passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
         let numbers = [self.number, self.other_number].map(u32::to_le_bytes);
@@ -158,7 +168,8 @@ impl Claim {
     }
 }
 
-/// Encodes a limit of x (fence); returns the length, if it fits.
+/// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit
+/// along x that keeps two neighbours apart; `line_digest` is the digest in the message.
 pub(super) fn encode_fence(line_digest: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, line_digest);
     let numbers = [fence.echo, fence.number].map(Word::new);

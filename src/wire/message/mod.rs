@@ -26,13 +26,14 @@ use super::upload::Upload;
 use crate::features::{ADJUST, ALTITUDE, FIELD, GUARD, SENSING, UPLOAD};
 use crate::guard::Fence;
 
-/// Maximum length of a sweep's body, bytes.
+/// Maximum length of a sweep message's body, bytes. A sweep carries target SIRs along the chain.
 const SWEEP: usize = 88;
 
-/// Maximum length of a body except a mission offer, bytes.
+/// Maximum length of a message body other than a mission offer, bytes.
 const LONG: usize = if SENSING { round::HEARD } else { SWEEP };
 
-/// Maximum length of a body, bytes: a mission offer, if possible.
+/// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it is
+/// a sensing message (with measurements) or a sweep.
 pub const MAX_BODY: usize = if Upload::OFFER > LONG {
     Upload::OFFER
 } else {
@@ -41,7 +42,7 @@ pub const MAX_BODY: usize = if Upload::OFFER > LONG {
 
 #[cfg(not(feature = "upload"))]
 impl Upload {
-    /// Length of an offer without the feature `upload`: its tag.
+    /// Length of an offer's body without an upload, bytes: its tag.
     const OFFER: usize = 1;
 
     const fn encode_offer(&self, _: u16, _: &mut [u8]) -> Option<usize> {
@@ -53,85 +54,90 @@ impl Upload {
     }
 }
 
-/// Message between neighbours. A *pass* goes along the chain once; its result comes back. *Onward* is its direction.
+/// Message between neighbours.
+///
+/// A *pass* is a message that travels along the chain once; its result travels back. *Onward* is the direction of a
+/// pass: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Target SIRs and farthest x, for the next relay.
+    /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each target.
     Sweep(Sweep),
-    /// Reply to target SIRs: the result for each.
+    /// Reply to a sweep of target SIRs: the result for each target.
     Verdict(SweepVerdict),
-    /// Reply to a repeated message: there is no result yet.
+    /// Reply to a duplicate pass message or view proposal: there is no result yet.
     Busy {
-        /// Number of the message in progress, or the view's hash.
+        /// Number of the pass in progress; for a view proposal, a 16-bit hash of the proposed view.
         number: u16,
     },
-    /// Heartbeat request, reply, or both, in either direction.
+    /// Either direction: heartbeat request, reply, or both.
     Heartbeat {
-        /// Digest of the mission loaded before flight.
+        /// Digest of the sender's mission as loaded before flight. It reveals a wrong configuration before take-off.
         mission: u16,
-        /// Number of the own request, 0 for none.
+        /// Number of the sender's own heartbeat request, 0 for none.
         request: u16,
-        /// Number of the answered request, 0 for none.
+        /// Number of the destination's heartbeat request that is answered, 0 for none.
         reply: u16,
     },
-    /// Altitudes and powers so far, for the next relay.
+    /// Message to the next relay: profiles (altitude and power) of all relays so far.
     Gather(Roster),
-    /// Reply to `Gather`: altitudes and powers of all relays.
+    /// Reply to `Gather`: profiles (altitude and power) of the whole chain.
     Gathered(Roster),
-    /// Interference estimate and measurements so far, for the next relay.
+    /// Message to the next relay: interference estimate, and all relays' measurements so far.
     Sense(Heard),
-    /// Reply to `Sense`: measurements of the sender and later relays.
+    /// Reply to `Sense`: measurements of the sender and of all later relays.
     Sensed(Heard),
-    /// Token of Algorithm 2, for the next relay.
+    /// Message to the next relay: token of Algorithm 2. The relay with the token moves to a better position.
     Token(Token),
-    /// Reply to a token: position, and the worst later SIR.
+    /// Reply to a token of Algorithm 2: position of the sender, and SIR of the worst hop after the sender.
     Moved(Moved),
-    /// Lease renewal by the leader, for the next relay.
+    /// Message to the next relay: lease renewal by the view's leader.
     Pulse(Pulse),
-    /// Reply to a lease renewal.
+    /// Reply to a lease renewal: its acknowledgement.
     Pulsed(Pulsed),
-    /// Neighbours and view of the sender, in either direction.
+    /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// Proposed view with votes, for the next relay.
+    /// Message to the next relay: proposal of a new view (membership of the chain), with the votes so far.
     Proposal(Proposal),
-    /// Reply to a proposed view: the decision.
+    /// Reply to a proposal of a view: the decision on it.
     Decision(Decision),
-    /// Limit of x (fence) between two neighbours, in either direction.
+    /// Either direction: limit of x (fence) that keeps two neighbouring relays apart.
     Fence {
-        /// Digest that is equal if the x axes are. It covers the loaded mission, and uploaded Tx and Rx positions.
+        /// Digest that shows two neighbours if they have the same x axis. It covers the mission loaded before flight,
+        /// and the Tx and Rx positions of an uploaded mission.
         line_digest: u16,
-        /// Limit of x, x of the agreed position, and flags.
+        /// Content of the message: the sender's limit of x, the x of its agreed position, and flags.
         fence: Fence,
     },
-    /// Newer mission than the destination's.
+    /// Either direction, also from the ground: a mission that is newer than the destination's.
     Offer {
-        /// Offered mission.
+        /// Uploaded mission that the sender offers.
         upload: Upload,
-        /// Nonce in the answered hello, 0 for none.
+        /// Nonce in the destination's hello that the offer answers, 0 for none.
         offer_number: u16,
     },
-    /// Interference level measured at Tx or Rx, from the ground.
+    /// Ground to relay: interference level measured at Tx or Rx.
     Level {
         /// Digest of the mission that the sender loaded before flight.
         mission: u16,
-        /// Mean interference power with noise, W: 1e-30 to 1e6.
+        /// Mean received interference power, W: 1e-30 to 1e6. It includes the noise of the measuring receiver.
         power_w: f32,
     },
-    /// Claim to the own node number, or another's echo.
+    /// Either direction: claim to the sender's node number, or the echo of another node's claim.
     Claim(Claim),
-    /// Request for all relays' reports, from the ground station.
+    /// Request for the reports of all relays; forwarded from relay to relay, away from the ground station.
     Watch {
-        /// Number of the request, wrapping; it rises every five seconds.
+        /// Number of the request, wrapping. The station raises it every five seconds.
         number: u16,
         /// Digest of the mission that the sender loaded before flight.
         mission: u16,
     },
-    /// Reports of relays, forwarded toward the ground station.
+    /// Reports on the states of relays; forwarded toward a ground station that requests them.
     Report(Reports),
 }
 
 impl Message {
-    /// Returns the digest of the mission, view or x axis.
+    /// Returns the digest in the message; `None` for a message without one. It shows the receiver if both nodes have
+    /// the same mission, view or x axis.
     pub fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -158,7 +164,8 @@ impl Message {
         }
     }
 
-    /// Returns true for the digest of mission and view.
+    /// Returns true for messages of passes along the chain and of lease renewals. Their digest identifies mission and
+    /// view.
     pub(crate) const fn belongs_to_view(&self) -> bool {
         matches!(
             self,
@@ -175,12 +182,13 @@ impl Message {
         )
     }
 
-    /// Returns true for the digest of the proposed mission.
+    /// Returns true for messages of a view change. Their digest identifies the proposed mission.
     pub(crate) const fn is_view_change(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages onward along the chain, not replies.
+    /// Returns true for messages that relays forward in the direction of a pass. They are passes, proposals and lease
+    /// renewals, but not the replies.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
@@ -195,8 +203,9 @@ impl Message {
 }
 
 impl Message {
-    /// Encodes into `buffer`; returns the length, at most [`MAX_BODY`]. `None` if it does not fit, or its feature is
-    /// missing.
+    /// Encodes the message body into `buffer`; returns its length, at most [`MAX_BODY`] bytes.
+    ///
+    /// `None` if it does not fit, or needs a feature that the crate was built without.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         match self {
             // Messages of a missing feature are never sent.
@@ -241,11 +250,11 @@ impl Message {
         }
     }
 
-    /// Decodes a message and checks all ranges.
+    /// Decodes a message and checks all ranges. Work linear in the length, at most [`MAX_BODY`].
     ///
     /// # Errors
-    /// [`MessageError::Encoding`] unless it is one message in its shortest form. [`MessageError::Value`] for a number
-    /// out of range, or a missing feature.
+    /// [`MessageError::Encoding`] if the bytes are not exactly one message in its shortest form, [`MessageError::Value`] for a
+    /// number that is not finite or out of range, and for a message of a missing feature.
     #[inline(never)]
     pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
         let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;

@@ -8,9 +8,9 @@ use crate::geodetic::{SITES_LENGTH, Sites};
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
-/// Encoding in an offer, which repeats the hello's number.
+/// Encoding in an offer message, which repeats the number of the hello that it answers.
 impl Upload {
-    /// Length of an offer, bytes.
+    /// Length of an offer's body, bytes.
     pub(super) const OFFER: usize = Self::LENGTH + size_of::<Word>();
 
     pub(super) fn encode_offer(&self, answer: u16, buffer: &mut [u8]) -> Option<usize> {
@@ -25,19 +25,18 @@ impl Upload {
     }
 }
 
-/// Encoding for storage: an offer without `offer_number`.
+/// Encoding of an uploaded mission for storage: an offer message without its `offer_number`.
 impl Upload {
-    /// Length of a stored upload, bytes.
+    /// Length of an encoded upload, bytes: the message tag and the fixed-size fields of the wire format.
     pub const LENGTH: usize = size_of::<u8>() + size_of::<OfferBody>();
 
-    /// Encodes the upload for storage; returns [`Upload::LENGTH`].
-    ///
-    /// `None` if it does not fit into `buffer`.
+    /// Encodes the uploaded mission for storage into `buffer`; `None` if it does not fit. Returns the length,
+    /// [`Upload::LENGTH`] bytes.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         write(&(tag::OFFER, OfferBody::of(self)), buffer)
     }
 
-    /// Decodes a stored upload; `None` if `bytes` are not exactly one.
+    /// Decodes a stored uploaded mission; `None` if `bytes` are not exactly one valid upload.
     ///
     /// The caller protects the stored bytes by a check sequence.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
@@ -48,22 +47,23 @@ impl Upload {
     }
 }
 
-/// Upload on the wire; packed: its size is its length.
+/// Uploaded mission on the wire. The struct is packed: its size in memory is the length on the wire, see
+/// [`Upload::LENGTH`].
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Version, and digest of the replaced mission.
+    /// Version of the upload, and digest of the mission loaded before flight, which the upload replaces.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// Ratio r, and transmit power of Rx, W.
+    /// Required ratio of the SIR from Rx to Tx to the SIR from Tx to Rx, and transmit power of Rx, W.
     back: [f32; 2],
-    /// SNR gap; 0 for equal time slots.
+    /// SNR gap of fitted time slots, each as long as its hop needs; 0 for equal slots.
     fitted_gap: f32,
-    /// Positions of Tx and Rx; all 0 if none.
+    /// Positions of Tx and Rx, encoded by [`Sites::to_bytes`]; all 0 if the upload has none.
     sites: SitesBody,
 }
 

@@ -8,7 +8,8 @@ use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
-/// Message tags: the first byte of a body. `MEASURED` is a sweep with interference, `ASIDE` one with a lateral offset.
+/// Message tags: the first byte of a body, which names the kind of message. There are three kinds of sweeps: `SWEEP`,
+/// `MEASURED` with measured interference, and `ASIDE` with a lateral offset.
 pub(super) mod tag {
     pub(crate) const SWEEP: u8 = 0;
     pub(crate) const VERDICT: u8 = 1;
@@ -35,7 +36,7 @@ pub(super) mod tag {
     pub(crate) const REPORT: u8 = 22;
 }
 
-/// 16-bit number in two bytes, unlike postcard's varint.
+/// 16-bit number in two bytes; postcard would encode a `u16` as a varint.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(super) struct Word([u8; 2]);
 
@@ -56,14 +57,14 @@ impl Serialize for Word {
     }
 }
 
-/// Encodes `body` into `buffer`; returns the length, if it fits.
+/// Encodes `body` at the start of `buffer`; returns its length, or `None` if it does not fit.
 pub(super) fn write<T: Serialize>(body: &T, buffer: &mut [u8]) -> Option<usize> {
     postcard::to_slice(body, buffer)
         .ok()
         .map(|written| written.len())
 }
 
-/// Decodes a value; returns it and the remaining bytes.
+/// Decodes a value from the start of `bytes`; returns the value and the remaining bytes.
 pub(super) fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), MessageError> {
     postcard::take_from_bytes(bytes).map_err(|_| MessageError::Encoding)
 }
@@ -75,8 +76,9 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Decodes one number per target; returns the rest, too. The count must be shortest: postcard's limit depends on
-/// `usize`.
+/// Decodes a list of one number per target SIR; returns the list and the remaining bytes. The count before the list
+/// must be encoded in its shortest form: postcard accepts longer forms up to a limit that depends on the width of
+/// `usize`, so nodes could differ in the lists that they accept.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -87,7 +89,8 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum of x values and slacks, m.
+/// Maximum of the x values and of the chain's slacks in a message, m. The last hop is limited to 1e9 m; twice this value leaves room for
+/// the sum of a position (at most 1e6 m) and that hop.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -117,10 +120,10 @@ pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
 
-/// Returns the position at y = 0.
+/// Returns the position above the line at `x_m` and `altitude_m`, m, of a relay of `power_w` watts.
 ///
 /// # Errors
-/// [`MessageError::Value`] if a number is out of range.
+/// [`MessageError::Value`] if one of the three numbers is out of range.
 pub(super) fn checked_place(
     [x_m, altitude_m]: [f32; 2],
     power_w: f32,
@@ -130,7 +133,7 @@ pub(super) fn checked_place(
     Ok(place)
 }
 
-/// Checks a condition.
+/// Checks a condition on the numbers of a message.
 ///
 /// # Errors
 /// [`MessageError::Value`] if the condition is false.
@@ -142,7 +145,7 @@ pub(super) const fn require(is_valid: bool) -> Result<(), MessageError> {
     }
 }
 
-/// Returns true if `y_m` is within -1e5 to 1e5 m.
+/// Returns true if the lateral offset `y_m` is within -1e5 to 1e5 m.
 pub(super) fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }
@@ -161,13 +164,13 @@ pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
         .all(|number| (least..=FARTHEST_M).contains(number))
 }
 
-/// Reason why a body is rejected.
+/// Reason why the body of a message is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum MessageError {
-    /// Encoding that is invalid, not the shortest, or too long.
+    /// The encoding is invalid or not the shortest, or bytes are left over.
     Encoding,
-    /// Number that is not finite or out of range.
+    /// A number in the message is not finite or outside its range.
     Value,
 }
 

@@ -18,30 +18,37 @@ use crate::wire::message::parts::{
     require, tag, take, take_targets, write,
 };
 
-/// Target SIRs, and the farthest x that meets each.
+/// Sweep message: target SIRs, and the farthest x at which the sender meets each target.
+///
+/// The message travels along the chain in a pass. "Farthest" means in the direction of the pass; at no x farther away
+/// is the target met.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the target list, rising and wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Tried target SIRs.
+    /// Target SIRs that this pass along the chain tries.
     pub ladder: Ladder,
-    /// Lateral offset, altitude and power of the sender.
+    /// Lateral offset, altitude and transmit power of the sender.
     pub relay: Station,
-    /// True for the joint method's offsets and altitudes.
+    /// True if relays use the lateral offsets and altitudes of the joint method. False if they use the configured
+    /// values.
     pub chosen: bool,
-    /// Measured Upsilon (mean of 1 / I) at the sender, 1/W.
+    /// Measured mean of 1 / I (Upsilon) at the sender's position, in 1/W; I is the interference power. `None` if the
+    /// receiver must use the mission's interference field.
     pub measured_per_w: Option<f32>,
-    /// Farthest x per target, m, lowest target first. It ends before the first missed target.
+    /// Farthest x, in the direction of the pass, at which the sender meets each target SIR, m. The list begins with the
+    /// lowest target, and ends before the first target that cannot be met.
     pub reaches: PerTarget,
 }
 
-/// Start of all sweeps; the farthest x follow.
+/// Fields at the start of all kinds of sweep messages. The list of the sender's farthest x follows at the end.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower middle target, or the only one; negative if plain.
+    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the other targets. A negative
+    /// sign marks a plain pass, in which every relay takes the farthest x that meets the target.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -68,7 +75,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes into `buffer`; returns the length, if it fits.
+    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured interference
+    /// (Upsilon) or the lateral offset is encoded between the head and the list of farthest x.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -124,18 +132,20 @@ impl Sweep {
     }
 }
 
-/// Reply to a sweep: results, and the destination's required position.
+/// Reply to a sweep message: result for each target, and the position that the destination must take.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SweepVerdict {
-    /// Number of the answered sweep.
+    /// Number of the pass along the chain, as in the sweep message that is answered.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Slack for each target, and the committed target.
+    /// Verdict of the sweep: the chain's slack for each target, and the committed target, if any.
     pub verdict: Verdict,
-    /// x that the destination must take, m. `None` for its farthest x.
+    /// x that the destination must take if a target is committed, m. `None` for the farthest x that the destination has
+    /// reported for this target.
     pub required_x_m: Option<f32>,
-    /// True if this or a later relay has an own power or altitude.
+    /// True if the power or fixed altitude of some relay differs from the mission's common profile. This relay is the
+    /// sender or a later relay of the pass.
     pub own: bool,
 }
 
@@ -171,37 +181,39 @@ impl SweepVerdict {
     }
 }
 
-/// Maximum number of profiles in one message.
+/// Maximum number of relay profiles (altitude and power) in one message.
 pub const MOST_NAMED: usize = 8;
 
-/// Altitude and power of a relay.
+/// Profile of a relay, altitude and power, that differs from the mission's common profile.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Index in the view, 1 next to Tx.
+    /// Index of the relay among the members of the view, 1 next to Tx.
     pub index: u16,
-    /// Fixed altitude, m; 0 if the relay chooses it.
+    /// Fixed altitude of the relay, m; 0 if the relay chooses its altitude.
     pub held_m: f32,
-    /// Transmit power, W.
+    /// Transmit power of the relay, W.
     pub power_w: f32,
 }
 
-/// Profiles of relays, by rising index.
+/// List of relay profiles (altitude and power), by rising index of the relays.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Altitudes and powers of relays: those so far, or all in a reply.
+/// Message that collects relay profiles (altitude and power). In a pass it has those of the relays up to the sender, in
+/// the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
-    /// Number of the collection, rising and wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Index of the last relay collected earlier; 0 at first.
+    /// Index of the last relay whose profile earlier passes collected; 0 in the first pass.
     pub after: u16,
-    /// Profiles of relays above `after`; others follow later.
+    /// Profiles of relays with an index above `after`. If the list is full, the next pass collects the remaining
+    /// profiles.
     pub seats: OwnSeats,
 }
 
-/// Profiles: index, altitude, m (0 if chosen), power, W.
+/// Relay profiles on the wire: index, altitude in m (0 if the relay chooses), and power in W.
 type SeatsBody = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
@@ -244,20 +256,20 @@ impl Roster {
     }
 }
 
-/// Token of Algorithm 2, which moves relays one by one.
+/// Token message of Algorithm 2, in which relays improve their positions one after the other.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
-    /// Number of the token, rising and wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
     /// Transmit power of the sender, W.
     pub power_w: f32,
-    /// Action of each relay that gets the token.
+    /// Action of each relay that receives the token in this pass.
     pub turn: AdjustStep,
-    /// SIR of the worst hop before, linear; 0 if unknown.
+    /// SIR of the chain's worst hop before this pass, linear; 0 if unknown.
     pub sir: f32,
 }
 
@@ -286,24 +298,24 @@ impl Token {
     }
 }
 
-/// Action of a relay that gets the token.
+/// Action of each relay that receives the token of Algorithm 2.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// The relay stays, and stores its neighbours' positions.
+    /// The relay stays, and only stores its neighbours' positions.
     Look,
-    /// The relay moves if that improves its SIR.
+    /// The relay moves if another position has a better SIR.
     Move {
-        /// Maximum change of altitude, m: the paper's `epsilon_h`.
+        /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Search method for the better position.
+        /// Search method for a better position.
         local: Local,
     },
-    /// The relay stays: Algorithm 2 has ended.
+    /// The relay no longer moves, because Algorithm 2 has ended.
     Stop,
 }
 
-/// Action: kind and three numbers; unused ones are 0.
+/// Action of a token on the wire: its kind, and three numbers. Numbers that the kind does not use are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct StepBody {
     kind: u8,
@@ -334,7 +346,8 @@ impl StepBody {
         }
     }
 
-    /// Returns the action; `None` if a number is invalid.
+    /// Returns the decoded action. `None` if a value is out of range, or if a number that the action does not use is
+    /// not 0.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
@@ -359,18 +372,18 @@ impl StepBody {
     }
 }
 
-/// Reply to a token, sent back to the leader.
+/// Reply to a token of Algorithm 2; relays send it back to the leader.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
-    /// Number of the answered token.
+    /// Number of the pass of Algorithm 2 in which the token was received.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
-    /// True if the sender or a later relay has moved.
+    /// True if the sender, or a later relay of the pass, has moved in this pass.
     pub position_changed: bool,
-    /// SIR of the worst hop after the sender, linear.
+    /// SIR of the worst hop after the sender in the direction of the pass, linear.
     pub worst_sir: f32,
     /// Transmit power of the sender, W.
     pub power_w: f32,
@@ -402,27 +415,30 @@ fn is_sir(sir: f32) -> bool {
     (0.0..=f32::MAX).contains(&sir)
 }
 
-/// Length of a sensing message's body, bytes.
+/// Length of a sensing message's body, bytes. It has the tag, the pass, the estimate, the sums, the interference level
+/// at Rx, and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Interference estimate, and sums of measurements.
+/// Sensing message: interference estimate, and sums of measurements. In a pass the sums cover the relays up to the
+/// sender, in the reply the sender and all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
-    /// Number of the message, rising and wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Interference estimate that all relays use.
+    /// Interference estimate that all relays must use.
     pub estimate: NumberedEstimate,
-    /// Weighted sums of measurements.
+    /// Weighted sums of the relays' measurements.
     pub sums: Sums,
-    /// Interference level measured at Rx.
+    /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node whose measurements contradict the others; 0 for none. Set in replies only.
+    /// Node number of a relay whose measurements contradict those of the other relays; 0 for none. Its measurements are
+    /// left out of `sums`. Set in replies only.
     pub excluded: u16,
 }
 
-/// Estimate: number, kind, four values; unused ones are 0.
+/// Interference estimate on the wire: its number, its kind, and four values. Values that the kind does not use are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct EstimateBody {
     number: Word,
@@ -482,7 +498,7 @@ impl EstimateBody {
     }
 }
 
-/// Sums on the wire, as two arrays.
+/// Measurement sums on the wire, as two arrays of nine numbers that are encoded one after the other.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {

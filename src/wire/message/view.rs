@@ -7,41 +7,45 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, take, write};
 
-/// Proposal of a new view (members), with votes.
+/// Proposal of a new view, an agreement on the chain's members. The message travels from relay to relay and collects
+/// votes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
-    /// Identifier of the mission, stored by all relays so far.
+    /// Identifier of the new view's mission. Every relay up to the sender has stored this mission.
     pub mission_id: MissionId,
-    /// Identifier of the proposed view, later than all known ones.
+    /// Identifier of the proposed view, later than every view known to its proposer.
     pub proposed_view: ViewId,
-    /// Number of relays reached, sender included: 1 to 1000.
+    /// Number of relays that the proposal has reached, including the sender, 1 to 1000.
     pub place: u16,
-    /// Votes so far, and remaining leases.
+    /// Votes of the relays up to the sender, and their remaining leases.
     pub poll: Poll,
 }
 
-/// Votes on a proposal, and remaining leases of earlier views.
+/// Votes on a view proposal so far, and remaining leases of earlier views. Every relay that the proposal reaches adds
+/// its vote.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
-    /// Newest agreed view known so far; only its members vote.
+    /// Newest view (membership) that a polled relay knows to be agreed on. Only its members have a vote.
     pub agreed: View,
-    /// Number of votes by members of `agreed`, 0 to 1000.
+    /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of `agreed` has voted (the leader for the initial view). Half of the votes are then a
-    /// quorum.
+    /// True if the proposer of the view `agreed` was polled. For the initial view the leader counts as the proposer.
+    /// With the proposer, exactly half of the members' votes are enough for a quorum.
     pub proposer: bool,
-    /// Longest remaining lease without a vote, in 0.1 s.
+    /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until earlier views' leases expire, in 0.1 s; 65535 if unknown. The new view must not be used earlier.
+    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Until
+    /// then relays must not use positions of the new view.
     pub earlier_lease_left: u16,
-    /// Latest view accepted after `agreed`; perhaps agreed on already.
+    /// Latest view after `agreed` that a polled member has accepted; `None` without such a view. It may be agreed on
+    /// already.
     pub successor: Option<Successor>,
 }
 
 impl Poll {
-    /// Returns a poll without votes; members of `agreed` vote.
+    /// Returns the state of a poll before any relay has voted. `agreed` is the view whose members vote.
     pub(crate) const fn of(agreed: View) -> Self {
         Self {
             agreed,
@@ -54,33 +58,35 @@ impl Poll {
     }
 }
 
-/// View accepted earlier; perhaps agreed on already.
+/// View that a polled relay has accepted in an earlier decision. It may be agreed on already.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
-    /// Identifier of the decided proposal.
+    /// Identifier of the proposal on which the view was decided.
     pub proposal: ViewId,
-    /// Decided view: the proposed one, or an earlier decided one.
+    /// Decided view: the proposed view, or an earlier view that was found to be decided already.
     pub view: View,
 }
 
-/// Decision on a proposed view, sent back to the proposer.
+/// Decision on the proposal of a view; sent back from relay to relay to the proposer.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
-    /// Identifier of the new view's mission.
+    /// Identifier of the mission that the members of the proposed view fly.
     pub mission_id: MissionId,
     /// Identifier of the proposed view.
     pub proposed_view: ViewId,
-    /// Number of relays up to the sender: 1 to 1000.
+    /// Number of relays on the proposal's path from the proposer to the sender, both included: 1 to 1000.
     pub place: u16,
-    /// Number of relays reached: 1 to 1000.
+    /// Number of relays that the proposal has reached: 1 to 1000.
     pub reached: u16,
-    /// Newest agreed view before this decision.
+    /// Newest view that any polled relay knows to be agreed on. The decided view replaces it.
     pub base: View,
-    /// View to accept; `None` without a quorum.
+    /// View to accept; `None` without a quorum. It is the proposed view, or an earlier view that was found to be
+    /// decided already.
     pub accepted: Option<View>,
-    /// Time until the accepted view may be used, in 0.1 s. Other members may hold a lease until then.
+    /// Time until relays are allowed to use positions of the accepted view, in tenths of a second. Until then, members
+    /// of the previous view that were not polled can still have a lease.
     pub usable_in: u16,
 }
 
@@ -136,7 +142,7 @@ impl SizedBody {
     }
 }
 
-/// Returns true if a view can be like this.
+/// Returns true if a view with this identifier and number of relays can exist.
 fn is_view(view: View) -> bool {
     (view.id == ViewId::LOADED || view.id.is_proposed()) && is_size(view.relays)
 }
@@ -168,7 +174,7 @@ impl Proposal {
         )
     }
 
-    /// Decodes a proposal; its other views must be earlier.
+    /// Decodes a proposal. Rejects it if the agreed view or the accepted view is not earlier than the proposed view.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(Word::number);
@@ -254,29 +260,31 @@ impl Decision {
     }
 }
 
-/// Lease renewal from the leader, forwarded to the last relay.
+/// Lease renewal, which the leader of a view sends and each relay forwards toward the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulse {
-    /// Number of the renewal, wrapping; follows a complete one.
+    /// Number of the renewal, wrapping. The leader sends it only after all members have taken part in the previous
+    /// renewal.
     pub number: u16,
-    /// Digest of mission and view.
+    /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
-    /// Duration of the lease, in 0.1 s: 1 to 65535.
+    /// Duration of the lease, in tenths of a second: 1 to 65535. The lease of each member starts when that member
+    /// takes part in the renewal.
     pub lease: u16,
-    /// Orders to the relays that leave or join.
+    /// Orders of the leader to the relays that leave or join.
     pub orders: Orders,
 }
 
-/// Orders of the leader to a leaving and a joining relay.
+/// Orders of the leader to a relay that is allowed to leave and to a relay that joins. Each lease renewal has them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
-    /// Node that may leave, 0 for none.
+    /// Node that is allowed to leave the chain, 0 for none. Its neighbours then select each other.
     pub leaver: u16,
-    /// Node that is called to join, 0 for none.
+    /// Node outside of the chain that is called to join it, 0 for none.
     pub joiner: u16,
-    /// True if all relays were at their positions at the last renewal.
+    /// True if all relays of the view were at their positions when the previous renewal completed.
     pub in_place: bool,
 }
 
@@ -288,17 +296,17 @@ impl Orders {
     };
 }
 
-/// Requests to leave or join, from the last relay up to the sender.
+/// Requests to the leader by relays that need to leave or would join. They are those from the last relay to the sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
-    /// Node that needs to leave most urgently, 0 for none.
+    /// Node that needs to leave the chain most urgently, 0 for none.
     pub leaver: u16,
-    /// Remaining flight time of `leaver`, s. 65535 if unknown; 0 if ordered to leave.
+    /// Remaining endurance of the node `leaver`, s; 65535 if unknown, 0 if it has the order to leave.
     pub endurance_s: u16,
-    /// Node that would join, 0 for none.
+    /// Node outside of the chain that would join it, 0 for none.
     pub spare: u16,
-    /// True if all relays from the last to the sender are in place.
+    /// True if all relays from the last relay to the sender are at their positions.
     pub in_place: bool,
 }
 
@@ -310,7 +318,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges two requests: the more urgent leaver, the lower spare.
+    /// Merges the requests of two parts of the chain. Of two departures the more urgent one counts, of two spares the
+    /// one with the lower number.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
@@ -330,27 +339,27 @@ impl Requests {
     }
 }
 
-/// Reply to a lease renewal, sent back to the leader.
+/// Acknowledgement of a lease renewal; sent back from relay to relay to the leader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulsed {
-    /// Number of the answered renewal.
+    /// Number of the lease renewal that this reply acknowledges.
     pub number: u16,
-    /// Digest of mission and view.
+    /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
-    /// True once the renewal has reached the last relay.
+    /// True if the renewal has reached the last relay of the chain. False if the renewal is still on its way.
     pub done: bool,
-    /// Requests of relays; meaningless while `done` is false.
+    /// Requests of the relays from the last relay to the sender. They have no meaning while `done` is false.
     pub requests: Requests,
 }
 
-/// Common part of a renewal and its reply.
+/// Common part of a lease renewal and of its acknowledgement. One decoder for both keeps the image small.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct RenewalBody {
     pass: PassId,
     number: Word,
     in_place: bool,
-    /// Leaving node (lower half) and joining node.
+    /// Node that leaves (lower half) and node that joins, as a u32; `None` if both are 0.
     nodes: Option<[u8; 4]>,
 }
 
@@ -365,10 +374,10 @@ impl RenewalBody {
         }
     }
 
-    /// Returns the leaving and the joining node, 0 for none.
+    /// Returns the nodes that leave and join, 0 for none.
     ///
     /// # Errors
-    /// [`MessageError::Value`] above 1000, or for two encoded zeros.
+    /// [`MessageError::Value`] if a number is above 1000, or if two numbers are encoded that are both 0.
     fn nodes(&self) -> Result<[u16; 2], MessageError> {
         let Some([a, b, c, d]) = self.nodes else {
             return Ok([0; 2]);

@@ -10,10 +10,10 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// Capacity of the session table ([`PEERS`]) as a node number.
+/// Capacity of the session table ([`PEERS`]), in the type of node numbers.
 const ROOM: u16 = 8;
 
-/// Silence after which a node is forgotten, as `dead_after`.
+/// Silence after which a node is forgotten; the value of `Settings::dead_after`.
 const GONE: Duration = Duration::from_millis(15_000);
 
 const KEY: Key = Key::new([0xA5; 32]);
@@ -33,7 +33,7 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// Returns a handshake or a `Busy` message.
+/// Returns a frame from the session `from`. It is a handshake, or a `Busy` message if `handshake` is false.
 fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {
@@ -63,7 +63,8 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Exchanges handshakes until none is pending; returns their number.
+/// Lets two nodes exchange handshakes until none is pending; returns the number of handshakes. `ends` are the nodes'
+/// sessions and node numbers, `counters` their frame counters.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
@@ -91,7 +92,8 @@ fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     }
 }
 
-/// Returns a new session that has exchanged handshakes with `own`.
+/// Returns a new session of node `node` in epoch `epoch`. It has exchanged handshakes with `own`, the session of node
+/// 1.
 fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Session {
     let mut other = Session::new(Auth { key: KEY, epoch }, 0, GONE);
     other.greet(1);
@@ -117,7 +119,8 @@ fn a_link_is_proven_by_three_handshakes_or_four_if_crossed() {
     }
 }
 
-/// Checks that both nodes prove their presence despite a loss.
+/// Checks that both nodes prove their presence to each other although one handshake is lost. A node without this proof
+/// requests a handshake again.
 #[test]
 fn one_lost_handshake_leaves_both_ends_proven() {
     for lost in 0..4 {
@@ -172,7 +175,8 @@ fn a_handshake_body_contains_the_known_nonces() {
     );
 }
 
-/// Checks that a full table keeps pinned and newest entries.
+/// Checks that a full session table keeps the pinned entries and the newest entry. Recorded frames of a forgotten
+/// node are rejected.
 #[test]
 fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     let mut own = session();
@@ -216,7 +220,8 @@ fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
 }
 
-/// Checks that replayed handshakes evict no node of proved presence.
+/// Checks that replayed handshakes of many nodes evict no known node from the session table. They replace only entries
+/// of nodes that have not proved their presence.
 #[test]
 fn recorded_handshakes_do_not_replace_known_nodes() {
     let mut handshakes = Vec::new();
@@ -243,7 +248,8 @@ fn recorded_handshakes_do_not_replace_known_nodes() {
     }
 }
 
-/// Checks that `greet` restores a session after a restart.
+/// Checks that `greet` restores a session after one of the two nodes has restarted. Before that, the restarted node
+/// cannot verify any frame.
 #[test]
 fn a_handshake_repairs_a_link_known_at_one_end() {
     let mut own = session();
@@ -292,7 +298,8 @@ fn after_the_last_nonce_no_new_node_is_accepted() {
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
 
-/// Checks that an old epoch is reported once, replays never.
+/// Checks that a node whose epoch is older than before, or reused, is reported once. Replays of its frames are not
+/// reported.
 #[test]
 fn an_epoch_that_went_back_is_reported_once_a_replay_never() {
     for epoch in [1, 7] {
@@ -330,7 +337,8 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks which frames reveal a node of the same number.
+/// Checks which frames under the relay's own number reveal another node with that number. Only a handshake with the
+/// same key, and with an epoch that is not older, reveals it.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -362,7 +370,7 @@ fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     }
 }
 
-/// Checks that a relay recognises its own frames' echo.
+/// Checks that the relay recognises the echo of its own frames, a handshake and a message.
 #[test]
 fn own_frames_are_recognised() {
     let mut counters = [0; 2];
@@ -374,7 +382,8 @@ fn own_frames_are_recognised() {
     }
 }
 
-/// Checks that two nodes with the same number are detected.
+/// Checks that two nodes with the same number are detected. Node 1 accepts the node with the larger claim. Its reply
+/// to the node with the smaller claim contains the larger claim.
 #[test]
 fn the_smaller_claim_receives_the_larger_one() {
     const FAR: u32 = 1 << 20;
@@ -418,7 +427,9 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks that the smaller claim wins once the larger is silent.
+/// Checks when the node with the smaller claim can replace another node of the same number. It is accepted once the
+/// node with the larger claim is silent. Recorded frames of the node with the larger claim are then rejected, until
+/// that node sends new frames.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

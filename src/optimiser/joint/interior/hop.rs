@@ -1,14 +1,14 @@
 //! Logarithms of both SIRs of a hop, with their derivatives.
 //!
-//! Lengths are in units of D. With v = p' - p the hop, l = |v|^2, and w the position of a receiver relative to the
-//! interferer, s = |w|^2 and nu the noise as in [`spacing`](crate::optimiser::spacing)
+//! Lengths are in units of D. With v = p' - p the hop, l = |v|^2, and w the position of a receiver relative to the interferer,
+//! s = |w|^2 and nu the noise as in [`spacing`](crate::optimiser::spacing)
 //!
 //! ```text
 //! ln F = a - ln l + ln q(p'),    ln (B / r) = a' - ln l + ln q(p),    ln q = ln s - ln(1 + nu s)
 //! ```
 //!
-//! where ln q is 0 at Rx and at Tx. With q1 = 1 / (s (1 + nu s)) and q2 = (nu / (1 + nu s))^2 - 1 / s^2, the
-//! derivatives of ln q by s, the gradients and second derivatives are
+//! where ln q is 0 at Rx and at Tx. With q1 = 1 / (s (1 + nu s)) and q2 = (nu / (1 + nu s))^2 - 1 / s^2, the derivatives of ln q
+//! by s, the gradients and second derivatives are
 //!
 //! ```text
 //! -ln l:  -2 v / l,    -(2 / l) I + (4 / l^2) v v'        ln q:  2 q1 w,    2 q1 I + 4 q2 w w'
@@ -21,13 +21,17 @@
 use super::super::chain::{Chain, Gains, SeatOf};
 use super::super::hop::{Triple, minus};
 
-/// Amount added to a squared length: its logarithm stays finite.
+/// Amount added to each squared hop length, so that its logarithm is finite. The unit is the squared distance from Tx
+/// to Rx.
 const SHORTEST: f32 = 1e-8;
 
-/// Levels of a hop: `ln(forward SIR)` and `ln(backward SIR / r)`. *Slack*: the level minus the target.
+/// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).
+///
+/// The factor r is the required ratio of backward to forward SIR. Other pairs of values for a hop have the same
+/// order: forward, backward. The *slack* of a level is the level minus the target.
 pub(super) type Levels = [f32; 2];
 
-/// Symmetric 3 x 3 matrix: xx, xy, xh, yy, yh, hh.
+/// Symmetric 3 x 3 matrix with rows and columns x, y and altitude h. The elements are xx, xy, xh, yy, yh, hh.
 pub(super) type Symmetric = [f32; 6];
 
 #[inline(never)]
@@ -35,7 +39,7 @@ pub(super) fn dot([a, b, c]: &Triple, [x, y, z]: &Triple) -> f32 {
     a * x + b * y + c * z
 }
 
-/// Adds `weight` v v' to `to`, v = (x, y, h).
+/// Adds the symmetric matrix `weight` v v' to `to`. The vector v is (x, y, h), and v' is its transpose.
 #[inline(never)]
 pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: &Triple, weight: f32) {
     let (a, b) = (weight * x, weight * y);
@@ -48,7 +52,7 @@ pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: &Triple, weight: f32) {
     *hh += weight * h * h;
 }
 
-/// Adds `weight` times the second vector to the first.
+/// Adds the vector (a, b, c), multiplied by `weight`, to the vector (x, y, h).
 #[inline(never)]
 pub(super) fn add_scaled([x, y, h]: &mut Triple, [a, b, c]: &Triple, weight: f32) {
     *x += weight * a;
@@ -62,12 +66,12 @@ fn add_to_diagonal([xx, _, _, yy, _, hh]: &mut Symmetric, value: f32) {
     *hh += value;
 }
 
-/// Logarithms of all hops' gains, at the mission's common power.
+/// Logarithms of the gains of all hops, for relays of the mission's common power.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LogGains {
     gains: Gains,
     common_w: f32,
-    /// Logarithm of r, the required backward to forward SIR.
+    /// Logarithm of r, the required ratio of backward to forward SIR.
     reverse: f32,
 }
 
@@ -87,7 +91,8 @@ impl LogGains {
         }
     }
 
-    /// Returns hop `k`'s log gains, the backward one divided by r.
+    /// Returns the logarithms of both gains of hop `k`; the backward gain is divided by r. `k` is 1 (from Tx) to N + 1
+    /// (to Rx).
     fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;
@@ -100,14 +105,16 @@ impl LogGains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q, q the inverse of interference plus noise.
+    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. The interference is divided by
+    /// the interferer's power received at the distance D from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;
         libm::logf(s / (1.0 + self.gains.noise * s))
     }
 
-    /// Returns the levels of hop `k`. `quiet_...` are ln q at its ends.
+    /// Returns the levels of hop `k` from `from` to `to`. `quiet_from` and `quiet_to` are ln q at `from` and at `to`;
+    /// q is the inverse of interference plus noise.
     pub(super) fn levels(
         &self,
         k: u16,
@@ -123,7 +130,9 @@ impl LogGains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s [levels](Levels) by its ends. If `convex`, indefinite terms are left out.
+    /// Returns the derivatives of hop `k`'s [levels](Levels) by the positions of its ends `from` and `to`. The second
+    /// derivatives of both levels are added up with the `weights`. If `convex` is true, terms that would make this sum
+    /// indefinite are left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -162,8 +171,9 @@ impl LogGains {
         hop
     }
 
-    /// Adds the derivatives of ln q: first to `slope`, second times -`weight` to `bend`. If `convex`, indefinite terms
-    /// are left out.
+    /// Adds the derivatives of ln q with respect to the position `at`. Here q is the inverse of interference plus noise.
+    /// The first derivatives are added to `slope`, and the second derivatives, multiplied by -`weight`, to `bend`. If
+    /// `convex` is true, terms that would make `bend` indefinite are left out.
     fn add_quiet(
         &self,
         at: Triple,
@@ -190,13 +200,15 @@ impl LogGains {
     }
 }
 
-/// Derivatives of [levels](Levels) by the ends. Second ones (`bend...`) are negated sums.
+/// Derivatives of a hop's [levels](Levels) with respect to the positions of its ends. The second derivatives
+/// (`bend...`) are weighted sums over both levels, negated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {
     pub(super) by_from: [Triple; 2],
     pub(super) by_to: [Triple; 2],
     pub(super) bend_from: Symmetric,
     pub(super) bend_to: Symmetric,
-    /// Part of `bend_...` from the hop's length.
+    /// Part of `bend_from` and `bend_to` that comes from the hop's length. The mixed second derivatives, with respect
+    /// to one end and the other, are the negative of this matrix.
     pub(super) bend: Symmetric,
 }

@@ -1,28 +1,27 @@
 //! Interior-point method for the positions that maximise the worst SIR of both directions.
 //!
-//! With data in both directions a hop has two reaches. In a sixth of the chains some hop is limited by both at once,
-//! where neither has a derivative. So differential dynamic programming, which follows one reach per hop, is not used:
-//! all positions move together. With the levels c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the method
-//! maximises
+//! With data in both directions a hop has two reaches, and in a sixth of the chains some hop is limited by both at
+//! once, where neither has a derivative. So differential dynamic programming, which follows one reach per hop, is not
+//! used: all positions move together. With the levels c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the
+//! method maximises
+//! `hop`), the method maximises
 //!
 //! ```text
 //! merit = T + mu (sum of ln(c_i - T) + sum of ln(distances to the box)),    sum of mu / (c_i - T) = 1
 //! ```
 //!
-//! over the positions, for a falling mu; the second equation is the maximum over T, which is below every level by at
-//! least mu. At the maximum for one mu, a concave problem of m levels has its optimum within m mu. Each iteration is a
-//! primal-dual Newton step (see `newton`): the multipliers lambda_i follow their own linear equation instead of mu /
-//! (c_i - T), and remain within a factor of that. A step ends before the box and is shortened until the merit does not
-//! fall.
+//! over the positions, for a falling mu; the second equation is the maximum over T, which is below every level by at least mu. At
+//! the maximum for one mu, a concave problem of m levels has its optimum within m mu. Each iteration is a primal-dual Newton step
+//! (see `newton`): the multipliers lambda_i follow their own linear equation instead of mu / (c_i - T), and remain within a factor
+//! of that. A step ends before the box and is shortened until the merit does not fall.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | `hop` | levels of a hop and their derivatives |
 //! | `newton` | block tridiagonal system of a step |
 //!
-//! T is the *target* and mu the *barrier weight*, which the constants give for all levels together. The lambda_i are
-//! the Lagrange multipliers; mu / (c_i - T) are their values at the optimum. The positions have *settled* once the
-//! merit gains little.
+//! T is the *target* and mu the *barrier weight*, which the constants give for all levels together. The lambda_i are the Lagrange
+//! multipliers; mu / (c_i - T) are their values at the optimum. The positions have *settled* once the merit gains little.
 //!
 //! This file has the state and one portion of the work. Lengths are in units of D. A lateral offset and altitude are
 //! stored in six bytes, as in the other solver. The memory of a segment of ten relays has its front during the
@@ -41,47 +40,51 @@ use core::task::Poll;
 use hop::{Derivatives, Levels, LogGains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight for a start far from the result.
+/// First barrier weight of the interior-point method, for a start far from the result.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight for a start near the result.
+/// First barrier weight of the interior-point method, for a start near the result.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight: bound on the error in ln(SIR).
+/// Last barrier weight. The result differs from a local optimum by at most this value, in ln(SIR), if the problem is
+/// concave around the optimum.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight falls.
+/// Factor by which the barrier weight falls once a Newton step gains little.
 const LESS: f32 = 0.3;
 
-/// Least increase of merit / mu that keeps mu, over half a step.
+/// Gain below which the positions are near enough to the optimum after more than half of a Newton step. The gain is the
+/// increase of the merit (the maximised function) divided by the barrier weight.
 const SETTLED: f32 = 0.1;
-/// Least increase of merit / mu that keeps mu, any step.
+/// Gain below which the positions are near enough to the optimum after a Newton step of any length. The gain is the
+/// increase of the merit (the maximised function) divided by the barrier weight.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Maximum step toward a limit, as a fraction.
+/// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor on a Newton step that lowers the merit.
+/// Factor by which a Newton step is shortened if it lowers the merit (the maximised function).
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and its optimal value.
+/// Maximum factor between a Lagrange multiplier and its value at the optimum. Multipliers are limited to this range.
 const APART: f32 = 5.0;
 
-/// Number of Newton steps for the target per call.
+/// Number of Newton steps for the target that one call makes.
 const STEPS: u8 = 4;
-/// Last Newton step for the target, from 0.
+/// Index, from 0, of the last Newton step for the target.
 const TARGETS: u8 = 12;
-/// Relative error that ends the Newton steps for the target.
+/// Relative error at which the Newton steps for the target end.
 const EXACT: f32 = 5e-4;
 
-/// Number of relays in a segment, handled by one call.
+/// Number of relays in a segment, the part of the chain that one call handles.
 const AT_ONCE: u16 = 10;
-/// Number of relays in a segment's first part.
+/// Number of relays in the first of a segment's two parts; the other part has the rest.
 const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop, and their multipliers as upper halves of f32.
+/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers. Each multiplier is stored as the upper half of an
+/// f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: Levels,
@@ -95,32 +98,32 @@ impl Hop {
     };
 }
 
-/// x of a relay, in Tx-Rx distances, and its hop.
+/// x of a relay, in units of the distance from Tx to Rx, and the hop that ends at the relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     x: f32,
     hop: Hop,
 }
 
-/// Uses the memory of the levels for Algorithm 1.
+/// Algorithm 1 uses the memory of the levels, which the interior-point method computes later.
 impl Noted for Node {
     fn lengths_m(&mut self) -> &mut [f32; 2] {
         &mut self.hop.level
     }
 }
 
-/// Newton step in x, y and h: upper halves of f32.
+/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32: three digits.
 type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
 enum Segment {
-    /// Equations of the segment's first relay, with earlier relays eliminated.
+    /// Equations of the segment's first relay, after all earlier relays are eliminated.
     Front(Front),
-    /// Newton steps of the first six and last four relays.
+    /// Newton steps of the segment's relays: of its first six and of its last four.
     Steps([Step; FIRST], [Step; SECOND]),
 }
 
-/// Position of a node and its limits, in Tx-Rx distances.
+/// Position (x, y, h) of a node and its limits, in units of the distance from Tx to Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -137,17 +140,18 @@ impl Spot {
         }
     }
 
-    /// Returns the distances from the lower limits.
+    /// Returns the distances of x, y and h from their lower limits.
     fn room_below(&self) -> Triple {
         minus(self.at, self.low)
     }
 
-    /// Returns the distances from the upper limits.
+    /// Returns the distances of x, y and h from their upper limits.
     fn room_above(&self) -> Triple {
         minus(self.high, self.at)
     }
 
-    /// Moves each coordinate inside its limits by the fraction `margin`.
+    /// Moves each coordinate at least `margin` inside its limits. `margin` is a fraction of the distance between the
+    /// limits.
     fn enclose(&mut self, margin: f32) {
         let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
@@ -159,48 +163,50 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of the levels, from this hop on.
+    /// Computation of all hops' [levels](Levels) at the tried positions. The field is the next hop.
     Levels(u16),
-    /// Newton steps for the target, this many done.
+    /// Computation of the target from all levels; the field is the number of Newton steps done.
     Target(u8),
-    /// Sum of the merit, from this hop on.
+    /// Summation of the merit, which decides if a step is accepted. The field is the next hop.
     Merit(u16),
-    /// Storage of accepted positions and multipliers, from this hop on.
+    /// Storage of the accepted positions and of new Lagrange multipliers; the field is the next hop.
     Accept(u16),
-    /// Elimination of all relays, from this segment on.
+    /// Elimination of all relays from the Newton system; the field is the next segment of the chain.
     Eliminate(u16),
-    /// Newton steps of this segment; true for its second part. The second part comes first.
+    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and a flag: true for the
+    /// segment's second half, which is computed before its first half.
     Substitute(u16, bool),
 }
 
-/// Interior-point method: all positions and the Newton step.
+/// Interior-point method for the worst SIR of both directions: all positions and the Newton step.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Forbidden ends of the line, as fractions of it. First: relay 1 near Rx; second: relay N near Tx.
+    /// Parts of the line Tx-Rx in which one relay must not be, as fractions of the distance from Tx to Rx. Relay 1 must
+    /// not be in the part next to Rx, the last relay not in the part next to Tx.
     pub(super) closed: [f32; 2],
     pub(super) nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Newton steps of the segment's second part.
+    /// Newton steps of the current segment's second part, kept until its first part is computed.
     second: [Step; SECOND],
-    /// Newton step of the next relay toward Rx.
+    /// Newton step of the next relay toward Rx, from which the current relay's step follows.
     ahead: Triple,
     work: Work,
     mu: f32,
     target: f32,
     least: f32,
-    /// Merit at the stored positions.
+    /// Merit (the maximised function) at the stored positions. A step is accepted if it does not lower the merit.
     merit: f32,
-    /// Sum of the barrier's logarithms so far.
+    /// Sum of the barrier's logarithms at the tried positions, for the hops handled so far.
     sum: f32,
-    /// Tried fraction of the step; 0 for the stored positions.
+    /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions only.
     share: f32,
     sums: Sums,
     by_target: f32,
-    /// True to reset the Lagrange multipliers to their optimal values.
+    /// True to replace the stored Lagrange multipliers by their values at the optimum.
     resets: bool,
     convex: bool,
     tries: u8,
@@ -235,7 +241,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         iterations: 0,
     };
 
-    /// Starts from the positions of [`Interior::put`]. `is_close` selects the smaller first weight.
+    /// Starts the interior-point method from the positions that [`Interior::put`] has set. If `is_close` is true, they
+    /// are close to the result, and the first barrier weight is smaller.
     pub(super) fn start(&mut self, chain: &Chain<'_, impl SeatOf>, is_close: bool) {
         self.gains = LogGains::new(chain);
         self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
@@ -244,7 +251,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.look(true);
     }
 
-    /// Sets relay `index` to `place`, inside its limits by `margin`.
+    /// Sets relay `index` to `place`, but at least `margin` inside the limits of its coordinates. `margin` is a
+    /// fraction of the distance between the limits.
     pub(super) fn put(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -259,7 +267,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.settle(chain, index, spot.at);
     }
 
-    /// Stores the position of relay `index`, in Tx-Rx distances.
+    /// Stores the position (x, y, h) of relay `index`, in units of the distance from Tx to Rx.
     #[inline(never)]
     fn settle(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, [x, y, h]: Triple) {
         let distance_m = chain.distance_m();
@@ -273,7 +281,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the x that Algorithm 1 stored, m.
+    /// Returns the x, m, that Algorithm 1 has stored for relay `index`.
     pub(super) fn noted_x_m(&self, index: u16) -> f32 {
         let node = self.nodes.get(usize::from(index).wrapping_sub(1));
         node.map_or(0.0, |node| node.hop.level[0])
@@ -283,7 +291,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.nodes.get_mut(usize::from(index).wrapping_sub(1))
     }
 
-    /// Returns node `index` and its limits; 0 is Tx, N + 1 Rx.
+    /// Returns the stored position of node `index` and its limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
         if index > chain.relays() {
@@ -306,7 +314,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the Newton step of relay `index`; zeros for Tx.
+    /// Returns the stored Newton step of relay `index` in x, y and h; zeros for Tx.
     fn step_of(&self, index: u16) -> Triple {
         let at = usize::from(index).wrapping_sub(1);
         let (segment, k) = (at / (FIRST + SECOND), at % (FIRST + SECOND));
@@ -319,7 +327,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         step.map_or([0.0; 3], |step| step.map(widened))
     }
 
-    /// Returns node `index` after the tried fraction of its step.
+    /// Returns the position of node `index` after the tried fraction of its Newton step, and its limits.
     #[inline(never)]
     fn moved(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
@@ -330,7 +338,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns hop `k`, from node `k - 1` to node `k`.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`. It leads to relay `k`, or to Rx if `k` is N + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -339,7 +347,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Prepares a test of the stored positions.
+    /// Prepares the evaluation of the stored positions, without a step. If `resets` is true, the evaluation replaces
+    /// the Lagrange multipliers.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -352,7 +361,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues by one portion; `Ready` with a target below all levels.
+    /// Continues the interior-point method by one bounded portion. `Ready` at the end, with a target in ln(SIR)
+    /// slightly below all [levels](Levels) of the hops at the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -400,7 +410,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the [levels](Levels) of ten hops, and their barrier.
+    /// Computes the [levels](Levels) of ten hops, from hop `k` on. Adds ln(distance to a limit) to the barrier for the
+    /// coordinates of the hops' ends.
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -431,7 +442,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Solves `sum of mu / (c - T) = 1` for the target T, in ln(SIR). Newton's method starts above, and T falls.
+    /// Computes the target T for the stored levels c, in ln(SIR). The sum of mu / (c - T) over all levels is 1.
+    ///
+    /// The inverse of this sum is concave in T, and Newton's method starts above the solution. So T falls to the
+    /// solution.
     fn approach(&mut self, relays: u16, steps: u8) {
         let end = steps + STEPS;
         self.work = Work::Target(end);
@@ -464,7 +478,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts the step if it does not lower the merit. Else it is shortened, then repeated without negative curvature.
+    /// Accepts the tried step if it does not lower the merit; otherwise shortens the step. After the last attempt the
+    /// step is computed again without negative curvature. If that fails too, the barrier weight falls.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -490,7 +505,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position and multipliers of relay `k`. They stay within the factor [`APART`] of the optimum.
+    /// Stores the new position of relay `k`. Limits the Lagrange multipliers of the hop to relay `k` to the factor
+    /// [`APART`] of their values at the optimum.
     fn accept(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         if self.share > 0.0 && k <= relays {
@@ -509,7 +525,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the next Newton step, or lowers the barrier weight.
+    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight. `Ready` with the target,
+    /// in ln(SIR), after the maximum number of steps.
     fn continue_with(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -528,7 +545,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers the barrier weight; `Ready` with the target after the last.
+    /// Lowers the barrier weight and continues; `Ready` with the target, in ln(SIR), after the last weight. `resets` is
+    /// true to replace the Lagrange multipliers, because no step with them has raised the merit.
     fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
@@ -540,7 +558,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns hop `k`'s derivatives at `ends`, its multipliers and slacks.
+    /// Returns the derivatives of hop `k`'s [levels](Levels) with respect to the positions `ends`. Also returns the
+    /// hop's Lagrange multipliers and slacks.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
@@ -548,7 +567,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         (hop, weights)
     }
 
-    /// Eliminates the first `count` relays of `segment`. `None` if a pivot is not positive.
+    /// Eliminates the first `count` relays of `segment` from the Newton system. Returns the equations of the next
+    /// relay; `None` if a pivot is not positive. `factors` receives the factors of the last six eliminated relays.
     #[inline(never)]
     fn eliminate(
         &mut self,
@@ -581,7 +601,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(front)
     }
 
-    /// Eliminates all relays of `segment`; `None` if impossible.
+    /// Eliminates all relays of `segment`, then begins the next segment or the computation of steps. `None` if the
+    /// Newton system cannot be solved.
     fn forward(&mut self, chain: &Chain<'_, impl SeatOf>, segment: u16) -> Option<()> {
         let relays = chain.relays();
         if segment == 0 {
@@ -603,7 +624,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Computes the steps of one part of `segment`, last relay first. `None` if a step is not finite.
+    /// Computes the Newton steps of one part of `segment`, from its last relay to its first. `None` if the system
+    /// cannot be solved or a step is not finite.
     fn substitute(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -654,7 +676,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Lowers the common factor: `spot` stays inside its limits.
+    /// Lowers the common factor on all Newton steps, so that the relay at `spot` stays within its limits. `step` is
+    /// that relay's step without this factor.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let (below, above) = (spot.room_below(), spot.room_above());
         for (step, (below, above)) in step.iter().zip(below.iter().zip(&above)) {
@@ -666,7 +689,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Updates hop `k`'s multipliers for whole steps of its ends.
+    /// Updates the Lagrange multipliers of hop `k` for whole (not shortened) Newton steps of its ends. `from` and
+    /// `to` are these steps, and `ends` the positions before them.
     fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
         let (hop, weights) = self.derivatives(relays, k, ends);
         let ([a, b], [c, d]) = (&hop.by_from, &hop.by_to);
@@ -678,7 +702,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns the number of levels, two per hop.
+/// Returns the number of levels, two for each hop.
 fn levels(chain: &Chain<'_, impl SeatOf>) -> f32 {
     2.0 * f32::from(chain.relays() + 1)
 }

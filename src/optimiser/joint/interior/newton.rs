@@ -1,7 +1,7 @@
 //! Newton step of all relays: elimination along the chain, and substitution back.
 //!
-//! With the levels c_i, the slacks s_i = c_i - T and the multipliers lambda_i (see [`super`]), the step dz of all
-//! positions and dT of the target solve
+//! With the levels c_i, the slacks s_i = c_i - T and the multipliers lambda_i (see [`super`]), the step dz of all positions and dT
+//! of the target solve
 //!
 //! ```text
 //! W dz = g + q dT,    q' dz = sigma dT
@@ -9,16 +9,15 @@
 //! q = sum of (lambda_i / s_i) grad c_i,    sigma = sum of lambda_i / s_i
 //! ```
 //!
-//! so dz = W^-1 g + dT W^-1 q and dT = q' W^-1 g / (sigma - q' W^-1 q). A hop has two ends, so W is block tridiagonal
-//! with blocks of 3 x 3: Cholesky's factors L_k of the diagonal and B_k beside it follow from one relay to the next,
+//! so dz = W^-1 g + dT W^-1 q and dT = q' W^-1 g / (sigma - q' W^-1 q). A hop has two ends, so W is block tridiagonal with blocks
+//! of 3 x 3: Cholesky's factors L_k of the diagonal and B_k beside it follow from one relay to the next,
 //!
 //! ```text
 //! L_k L_k' = W_kk - B_k B_k',    B_(k+1) = W_(k+1,k) L_k'^-1,    u_k = L_k^-1 (g_k - B_k u_(k-1))
 //! ```
 //!
-//! and the step from the last to the first: L_k' dz_k = u_k - B_(k+1)' dz_(k+1). A [`Front`] is all that the relays
-//! after k need to know of those before. It is stored for one relay in ten; the factors are computed again on the way
-//! back.
+//! and the step from the last to the first: L_k' dz_k = u_k - B_(k+1)' dz_(k+1). A [`Front`] is all that the relays after k need
+//! to know of those before. It is stored for one relay in ten; the factors are computed again on the way back.
 //!
 //! A pivot that is not positive means that W is not positive definite. The caller then leaves out its negative parts.
 
@@ -27,35 +26,40 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest positive pivot, divided by the diagonal element before elimination.
+/// Smallest pivot that counts as positive, divided by the diagonal element before the elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
-/// Curvature of a coordinate that must not move.
+/// Curvature of a coordinate whose two limits are equal. The curvature is so large that the Newton step does not move
+/// this coordinate.
 const STIFF: f32 = 1e18;
 
-/// Equations of a relay after elimination of all before it. The hop to the next is not added yet.
+/// Equations of the Newton system for one relay, after the elimination of all previous relays. The terms of the hop
+/// to the next relay are not added yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Symmetric,
     slope: Triple,
     column: Triple,
-    /// Amount that the elimination subtracted from the diagonal of `bend`.
+    /// Amount that the elimination of earlier relays subtracted from the diagonal of `bend`.
     taken: Triple,
 }
 
-/// Coefficients: next relay's x, y, h; constant; change of the target.
+/// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the next
+/// relay's steps in x, y and h. The last two are the right side: its constant part, and its part per unit of the
+/// target's change.
 type Row = [f32; 5];
 
-/// Equations of an eliminated relay, for its Newton step.
+/// Equations of an eliminated relay, for the computation of its Newton step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// Cholesky factor: 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal is inverted.
+    /// Cholesky factor of the relay's 3 x 3 matrix: 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal is stored as
+    /// inverses, because it is a divisor.
     lower: [f32; 6],
-    /// Equations for the steps in x, y and h.
+    /// Linear equations for the relay's steps in x, y and h, one row each.
     rows: [Row; 3],
 }
 
-/// Sums over all relays, for the target's Newton step.
+/// Sums over all hops and relays, for the Newton step of the target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,
@@ -63,7 +67,7 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Multipliers and slacks of a hop, and the barrier weight.
+/// Lagrange multipliers of a hop's levels, the slacks of the levels, and the barrier weight `mu`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -72,18 +76,19 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns multiplier / slack for each direction of the hop.
+    /// Returns the Lagrange multiplier divided by the slack for each direction of the hop.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the optimal multipliers, mu / slack, for each direction.
+    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is the barrier weight
+    /// mu divided by the slack.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the multipliers after changes of the slacks.
+    /// Returns the hop's Lagrange multipliers after a Newton step that changes its slacks by a and b.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -98,8 +103,11 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop`; `None` if a pivot is not positive. In a `convex` system a small pivot is a
-    /// rounding error.
+    /// Eliminates the relay before `hop` from the Newton system. On entry `self` has the rows of this relay, on return
+    /// the rows of the node at `spot`, where `hop` ends.
+    ///
+    /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
+    /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
     pub(super) fn pass(
         &mut self,
         is_relay: bool,
@@ -140,7 +148,7 @@ impl Front {
         add_scaled(&mut self.column, slope, ratio);
     }
 
-    /// Adds the barrier that keeps the relay inside its limits.
+    /// Adds the derivatives of the barrier that keeps the relay at `spot` between its limits.
     fn enclose(&mut self, mu: f32, spot: &Spot) {
         let ([a, b, c], [d, e, f]) = (spot.room_below(), spot.room_above());
         let [xx, _, _, yy, _, hh] = &mut self.bend;
@@ -150,7 +158,8 @@ impl Front {
         barrier(mu, c, f, h, hh);
     }
 
-    /// Adds the next hop, then eliminates; `None` without positive pivot.
+    /// Adds the terms of the hop to the next node to this relay's equations, then eliminates this relay. `None` if a
+    /// pivot is not positive.
     fn eliminate(
         &mut self,
         hop: &Derivatives,
@@ -182,7 +191,7 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the eliminated relay `factor`, and adds it to `sums`.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations. Adds it to `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -214,7 +223,8 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of `mu (ln a + ln b)`, the second negated.
+/// Adds the derivatives of one coordinate's barrier, mu (ln a + ln b), to `slope` and `bend`. The second derivative is
+/// negated before. a and b are the distances to the lower and the upper limit, and mu is the barrier weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
@@ -226,7 +236,7 @@ fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     }
 }
 
-/// Adds `weight` a b' to the first three columns.
+/// Adds the matrix `weight` a b' to the first three columns of `rows`. b' is the transpose of the vector b.
 #[inline(never)]
 fn add_product(rows: &mut [Row; 3], a: &Triple, b: &Triple, weight: f32) {
     for ([x, y, h, ..], a) in rows.iter_mut().zip(a) {
@@ -238,7 +248,7 @@ fn add_product(rows: &mut [Row; 3], a: &Triple, b: &Triple, weight: f32) {
     }
 }
 
-/// Subtracts `part` times `from`, then scales by `scale`.
+/// Subtracts `part` times the row `from` from the row `to`, and multiplies the row `to` by `scale`.
 #[inline(never)]
 fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
     for (cell, from) in to.iter_mut().zip(from) {
@@ -246,7 +256,7 @@ fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
     }
 }
 
-/// Solves L' z = v; L is the Cholesky factor.
+/// Returns the solution z of L' z = v. L' is the transpose of the Cholesky factor, the first argument.
 fn backward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
     let z = z * f;
     let y = (y - e * z) * d;
@@ -259,7 +269,8 @@ impl Factor {
         rows: [[0.0; 5]; 3],
     };
 
-    /// Returns this relay's step from the target's and next relay's.
+    /// Returns this relay's Newton step. It follows from the target's step `by_target` and the next relay's step
+    /// `next`.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
         let known = (self.rows)
             .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));
@@ -274,7 +285,7 @@ impl Sums {
         column: 0.0,
     };
 
-    /// Returns the target's step; `None` without a maximum.
+    /// Returns the Newton step of the target. `None` if the system has no maximum, so that there is no step.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;
         (rest > 0.0).then(|| self.slope / rest)

@@ -6,12 +6,11 @@
 //! target that the relays will agree on, with their separation. The best chain is the result.
 //!
 //! The first chain, at the common altitude, is only compared: so the result is not below that of Algorithm 1. The next
-//! five were chosen from 216, one after another. The criterion was the number of 3 840 random scenes in which the best
-//! result so far misses the optimum. They are described from the end with more power, whose signal may pass the
-//! interferer in one hop. Relays away from the interferer or high are mostly better than relays close to it, since the
-//! method finds its way down but not around. The last chain keeps relay 1 from the x beyond the interferer. These x are
-//! another local optimum for it. From the other chains the method mostly finds that one, as the x of Algorithm 1 are
-//! the farthest.
+//! five were chosen from 216, one after another, by the number of 3 840 random scenes in which the best result so far
+//! misses the optimum. They are described from the end with more power, whose signal may pass the interferer in one
+//! hop. Relays away from the interferer or high are mostly better than relays close to it, since the method finds its
+//! way down but not around. The last chain keeps relay 1 from the x beyond the interferer. These x are another local
+//! optimum for it. From the other chains the method mostly finds that one, as the x of Algorithm 1 are the farthest.
 
 use super::judge::JUDGED;
 use crate::optimiser::joint::chain::{Chain, SeatOf};
@@ -25,32 +24,34 @@ use crate::root::sqrt;
 use crate::sir::square;
 use core::task::Poll;
 
-/// Number of relays per call that get initial positions.
+/// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
-/// Parts of the way to even spacing: first run, repeated runs. They separate relays at the same x.
+/// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays at
+/// the same x. The first value is for the first run of this method, the second for repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
-/// Initial chain, told from the end with more power.
+/// Description of an initial chain, from the end with more power (Tx or Rx) to the other end.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offsets of first, middle and last relay, away from the interferer. Fractions of the largest permitted
-    /// one.
+    /// Lateral offsets of the first, the middle and the last relay, away from the interferer. They are fractions of the
+    /// largest permitted offset.
     aside: [f32; 3],
-    /// Altitudes of first and last relay: 0 lowest, 1 highest.
+    /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
     up: [f32; 2],
     along: Along,
 }
 
-/// Choice of the relays' initial x.
+/// Way to choose the initial x of the relays along the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Along {
-    /// x from Algorithm 1.
+    /// x from Algorithm 1, for the relays' lateral offsets and altitudes.
     Line,
-    /// Evenly spaced from first to last x, as fractions from the stronger end.
+    /// First and last x of evenly spaced relays, counted from the end with more power. They are fractions of the
+    /// distance from Tx to Rx.
     Even([f32; 2]),
-    /// x from Algorithm 1 except those of `close_beyond`. Offsets and altitudes follow an ellipse down to the weaker
-    /// end.
+    /// x from Algorithm 1, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow part of an
+    /// ellipse down to the end with less power.
     Arc,
 }
 
@@ -68,7 +69,7 @@ impl Start {
         Self { aside, up, along }
     }
 
-    /// Returns relay `index`'s lateral offset and altitude in `room`.
+    /// Returns the lateral offset and altitude in `room` of relay `index` of this initial chain.
     fn cross_section(self, chain: &Chain<'_, impl SeatOf>, index: u16, room: Room) -> CrossSection {
         let (relays, before) = (chain.relays(), before(chain, index));
         // 0 for the relay at the end with more power, 1 for the relay at the other end.
@@ -100,48 +101,48 @@ impl Start {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Highest target that an initial chain meets.
+    /// Search for the highest target that an initial chain meets.
     Start,
-    /// Highest target at the interior-point method's lateral offsets and altitudes.
+    /// Search for the highest target at the interior-point method's lateral offsets and altitudes.
     Result,
-    /// Finer search for the best chain's highest target.
+    /// Finer search for the best chain's highest target, at the end of the whole solution.
     Last,
 }
 
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of initial offsets and altitudes, after this many relays.
+    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays done.
     Begin(u16),
-    /// Highest target that Algorithm 1 meets.
+    /// Search for the highest target that Algorithm 1 meets at the current lateral offsets and altitudes.
     Seek(Seek, Purpose),
-    /// Relays' x by Algorithm 1 for this target, in ln(SIR).
+    /// Computation of the x of all relays by Algorithm 1 for this target, in ln(SIR).
     Settle(f32),
-    /// Choice of starting positions, after this many relays.
+    /// Choice of the positions at which the interior-point method starts. The field is the number of relays done.
     Put(u16),
     Interior,
 }
 
-/// Joint solver for data in both directions.
+/// Joint solver of a chain that carries data in both directions.
 #[derive(Clone, Debug)]
 pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) interior: Interior<RELAYS, SEGMENTS>,
-    /// Best target so far, ln(SIR); `None` before the first.
+    /// Best target found, in ln(SIR); `None` until a target is found.
     best: Option<f32>,
-    /// Lateral offsets and altitudes of the best chain.
+    /// Lateral offsets and altitudes of the chain that meets the best target.
     best_cells: Cells<RELAYS>,
     work: Work,
     line: Line,
-    /// Target reached by the last interior-point run, ln(SIR).
+    /// Target that the last run of the interior-point method has reached, in ln(SIR).
     reached: f32,
-    /// Number of repeated interior-point runs of this initial chain.
+    /// Number of repeated runs of the interior-point method for the current initial chain.
     again: u8,
-    /// Number of the initial chain; 0 has the common altitude.
+    /// Number of the current initial chain. In chain 0 all relays are at the common altitude.
     number: u8,
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
-    /// State before the first call: all bytes 0, no flash.
+    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
     pub(super) const NEW: Self = Self {
         interior: Interior::NEW,
         best: None,
@@ -153,8 +154,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         number: 0,
     };
 
-    /// Continues by one portion; `Ready` with the linear target SIR. Two relays of Algorithm 1, ten of a Newton step,
-    /// else twenty.
+    /// Continues the solution by one portion; ready with the target SIR, linear, at the end. A portion is two relays
+    /// of Algorithm 1, ten relays of a Newton step, or twenty relays of other work.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let next = match self.work {
             Work::Begin(done) => self.begin_start(chain, done),
@@ -206,7 +207,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns true if the initial x are those of [`Along::Arc`].
+    /// Returns true if the initial x of the current chain are chosen by [`Along::Arc`].
     fn is_arc(&self) -> bool {
         self.start().is_some_and(|start| start.along == Along::Arc)
     }
@@ -217,7 +218,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Begin(0)
     }
 
-    /// Chooses initial offsets and altitudes after the first `done` relays.
+    /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. The first `done`
+    /// relays have theirs already. After the last initial chain, the next work is the final search for the best chain's
+    /// target.
     fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -252,9 +255,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Excludes the x beyond the interferer, near the stronger end. The SIR there rises:
-    /// `((x - X)^2 + a^2) / (x^2 + a^2)`, smallest at `x (x - X) = a^2`. X and x count from that end; a is the distance
-    /// from the line, here from the relay's cross-section.
+    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. There the SIR of
+    /// this relay rises with its distance from that end.
+    ///
+    /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
+    /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
+    /// interferer from the line is replaced by its distance from the relay's cross-section.
     fn close_beyond(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let (distance_m, is_turned) = (chain.distance_m(), is_turned(chain));
         let index = if is_turned { chain.relays() } else { 1 };
@@ -274,13 +280,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the initial chain; `None` after the last.
+    /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
+    /// altitude, uses only `along` of chain 1: its x come from Algorithm 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
     }
 
-    /// Stores the chain if `sigma` is best; returns the next work.
+    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best so far. Returns the next work: a run of
+    /// the interior-point method if Algorithm 1 has found positions worth an improvement, otherwise the next initial
+    /// chain.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);
@@ -299,7 +308,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the interior-point method after the first `done` relays.
+    /// Chooses the positions at which the interior-point method starts, and starts it. The first `done` relays have
+    /// theirs already. Lateral offsets and altitudes are the stored values. The x come from Algorithm 1, or are evenly
+    /// spaced.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.relays();
@@ -336,7 +347,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Interior
     }
 
-    /// Continues Algorithm 1 for `sigma`, in ln(SIR); `None` if missed.
+    /// Continues Algorithm 1 for the target `sigma`, in ln(SIR). Ready with `None` if the target cannot be met.
     fn line(&mut self, chain: &Chain<'_, impl SeatOf>, sigma: f32) -> Poll<Option<bool>> {
         let Interior {
             cells,
@@ -348,15 +359,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if initial chains are described from Rx. Then Rx has more power, or equal power and a lower required
-/// SIR.
+/// Returns true if the initial chains are described from Rx. This is so if Rx has more power than Tx. With equal powers
+/// it is so if less SIR is required backward, because Rx on the ground receives less interference than relay 1.
 fn is_turned(chain: &Chain<'_, impl SeatOf>) -> bool {
     let config = chain.mission.config();
     let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
     rx_w > tx_w || (rx_w >= tx_w && config.reverse < 1.0)
 }
 
-/// Returns the number of relays nearer to the stronger end.
+/// Returns the number of other relays between relay `index` and the end with more power (Tx or Rx).
 fn before(chain: &Chain<'_, impl SeatOf>, index: u16) -> u16 {
     if is_turned(chain) {
         chain.relays() - index
@@ -365,17 +376,19 @@ fn before(chain: &Chain<'_, impl SeatOf>, index: u16) -> u16 {
     }
 }
 
-/// Returns a point on the unit circle, (1, 0) to (0, 1).
+/// Returns a point on the unit circle: from (1, 0) for `part` = 0 to (0, 1) for `part` = `whole`.
 fn quarter(part: u16, whole: u16) -> [f32; 2] {
     let [a, b] = [whole.saturating_sub(part), part].map(f32::from);
     let radius = sqrt(square(a) + square(b));
     [a / radius, b / radius]
 }
 
-/// Minimum improvement for another run, in ln(SIR).
+/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1 meets
+/// at the last run's lateral offsets and altitudes, minus the target of that run.
 const NEW: f32 = 3e-4;
-/// Maximum number of repeated interior-point runs per initial chain.
+/// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// First target above the last run's, in ln(SIR): its possible error.
+/// Difference in ln(SIR) of the first target to try and the result of the interior-point method. It is the possible
+/// error of this method.
 const ABOVE: f32 = 1e-4;

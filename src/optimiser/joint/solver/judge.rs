@@ -13,13 +13,16 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision of an improved chain's highest target, in ln(SIR).
+/// Precision in ln(SIR) of the search for the highest target that an improved chain meets.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound, in ln(SIR); it ends the search.
+/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). If a chain reaches
+/// the bound within this tolerance, the search for better chains ends.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Margin above the bound where a rising target stops, ln(SIR).
+/// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.
+///
+/// The search then checks if the chain reaches the bound; if so, the search ends.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -42,8 +45,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records the result of the tried target; selects the next work. `met`: `None` if infeasible, true if some relays
-    /// cannot take their farthest x.
+    /// Records if the chain meets the tried target, and selects the next piece of work.
+    ///
+    /// `met` is `None` if the target is infeasible; otherwise it is true if some relays have to stay short of their
+    /// farthest positions.
     pub(super) fn tried(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -150,8 +155,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the search for the improved chain's highest target. Hops are as in flight. `sigma` ended the
-    /// improvement; `ceiling` bounds all chains; in ln(SIR).
+    /// Returns the work that searches for the highest target of the current chain, after an ascent. An ascent is an
+    /// improvement in steps.
+    ///
+    /// Hops are computed exactly as the relays compute them from their messages. Relays are allowed to stay short of
+    /// their farthest position. The ascent ended at the target `sigma`, and `ceiling` is the upper bound of all chains,
+    /// both in ln(SIR).
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -162,13 +171,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the chain can become the best one.
+    /// Returns true if the current chain can still become the best chain. Such a chain is improved again.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the chain cannot become the best one.
+    /// Returns true if the current chain can no longer become the best chain, and its improvement stops. `turn` is the
+    /// next action of the improvement.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -203,21 +213,24 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays for single moves. Chains with fixed altitudes have kinks, and are always moved.
+/// Maximum number of relays for which single relays are moved in the last phase. If some relays have a fixed altitude,
+/// they are always moved, because the chain's path then has kinks.
 const POLISHED: u16 = 5;
 
-/// Number of halvings of single relays' trial moves.
+/// Number of times that the trial moves of single relays are halved in the last phase.
 const HALVINGS: u16 = 12;
-/// First trial move, as a fraction of the allowed range.
+/// First trial move of a relay in the last phase, as a fraction of its allowed range.
 const FIRST_MOVE: f32 = 0.25;
 
-/// Minimum improvement that accepts a trial move, in ln(SIR).
+/// Minimum gain of the target for which a trial move of a relay is accepted, in ln(SIR).
 pub(super) const GAIN: f32 = 2e-5;
-/// Maximum number of accepted trial moves.
+/// Maximum number of accepted trial moves, after which the solution ends.
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the trial move: relay, kind, and halvings. Kinds 0 to 3: down, up, left, right; others copy a relay.
+    /// Returns the current trial move: the relay's index, the kind of move, and the number of halvings. Kinds 0 to 3
+    /// move the relay down, up, left or right. Kinds 4 and 5 copy the lateral offset and altitude of the relay two
+    /// places toward Rx or toward Tx.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -225,7 +238,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of one relay, from the target `sigma`.
+    /// Tries the next move of one relay in a chain that meets the target `sigma`, in ln(SIR).
+    ///
+    /// The relay moves by a fraction of its allowed range, which is halved from round to round. Or it takes another
+    /// relay's lateral offset and altitude. These moves find gains that the derivatives do not show, because another
+    /// constraint is active.
     pub(super) fn polish(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -271,7 +288,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Begins the next initial chain, or ends the search.
+    /// Begins the improvement of the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -321,7 +338,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns true if `start` cannot beat the best chain.
+    /// Returns true if the initial chain `start` cannot lead to a better chain than the best one found.
     fn is_skipped(&self, chain: &Chain<'_, impl SeatOf>, start: Start) -> bool {
         match start {
             Start::Near if self.again => false,
@@ -337,7 +354,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns relay `index`'s lateral offset and altitude.
+    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they come from a new initial
+    /// chain, otherwise from the stored chain.
     pub(super) fn shaped(
         &self,
         chain: &Chain<'_, impl SeatOf>,

@@ -14,8 +14,7 @@
 //! | `judge` | the steps after a target is found: the next initial chain, or the polish |
 //! | `both` | the solver for both directions |
 //!
-//! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the
-//! work.
+//! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the work.
 
 mod both;
 mod judge;
@@ -37,7 +36,7 @@ use both::Both;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {
-    /// Number of moved relays.
+    /// Number of relays that the forward pass has moved.
     done: u16,
     /// Position of the last moved relay after its move.
     from: Placement,
@@ -60,44 +59,47 @@ impl ForwardPass {
 enum Work {
     /// Begin the next initial chain.
     Begin,
-    /// Search for the highest target of the unchanged chain.
+    /// Search for the highest target SIR that the chain meets without moves of its relays.
     Seek(Seek, Purpose),
-    /// Compute and store the chain for one target, ln(SIR).
+    /// Compute the chain for one target, as ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Move one relay; the chain meets this target, ln(SIR).
+    /// Try the next move of one relay. The field is the target that the chain meets now, in ln(SIR).
     Polish(f32),
-    /// Compute this segment's moves, from Rx to Tx.
+    /// Run the backward pass, which computes the relays' moves, for the segment with this number.
     Back(u8),
-    /// Move the relays: fraction, target ln(SIR), true to store.
+    /// Run the forward pass, which moves the relays. The fields are the fraction of the computed moves, the target in
+    /// ln(SIR), and a flag: true to store the chain, false for a trial.
     Forward(f32, f32, bool),
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Highest target of an initial chain.
+    /// Search for the highest target that an initial chain meets.
     Start,
-    /// Highest target of the unchanged chain.
+    /// Search for the highest target that the current chain meets without moves of its relays.
     Raise,
-    /// Slack after its upper limit fell.
+    /// Computation of the chain's slack after the upper limit on the slack was lowered.
     Tighten,
-    /// Highest target of an improved chain, with margins.
+    /// Search for the highest target of an improved chain, with the margins of the improvement.
     Judge,
-    /// Highest target of an improved chain, with hops as in flight.
+    /// Search for the highest target of an improved chain, with the hops exactly as in flight.
     Last,
-    /// Check against the upper bound, with hops as in flight.
+    /// Check if the chain meets the upper bound of all chains, with the hops exactly as in flight.
     Probe,
-    /// Check of one relay's move, with hops as in flight.
+    /// Check of a trial move of one relay, with the hops exactly as in flight.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if hops are exactly as in flight. Relays may then stop before their farthest x.
+    /// Returns true if hops are computed exactly as the relays compute them in flight, from messages.
+    ///
+    /// A relay is then allowed to stay short of its farthest position.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
 }
 
-/// Joint solver for data in one direction, Tx to Rx.
+/// Joint solver of a chain that carries data in one direction only, from Tx to Rx.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is told on its own, by another part of the work"
@@ -106,36 +108,38 @@ impl Purpose {
 struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     number: u8,
     start: Start,
-    /// Best target, ln(SIR), and its initial chain's number.
+    /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Highest target of any improvement, ln(SIR). Chains predicted below it are dropped.
+    /// Highest target that the improvement of any chain has reached, ln(SIR). A chain that is predicted to end below it
+    /// is dropped.
     highest: f32,
     best_cells: Cells<RELAYS>,
-    /// Target at the end of the best improvement, ln(SIR).
+    /// Target at which the improvement of the best chain ended, in ln(SIR). The last search starts there.
     best_judged: Option<f32>,
-    /// Target at the end of this improvement, ln(SIR). `None` while it runs or if stopped early.
+    /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, or if it
+    /// was stopped early.
     judged_at: Option<f32>,
-    /// True unless this improvement was stopped early.
+    /// True if the current chain's improvement has not been stopped early.
     is_whole: bool,
-    /// True in the last phase, with moves of single relays.
+    /// True in the last phase, which searches the best chain's target more finely and moves single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
     line: Line,
-    /// x of each relay and its limit, m.
+    /// x of each relay and its upper limit, m, during a search with the hops exactly as in flight.
     notes: [[f32; 2]; RELAYS],
-    /// True if some relays cannot take their farthest x.
+    /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
-    /// True if the minimum separation restricted any improvement.
+    /// True if the minimum separation of relays has restricted the improvement of any chain.
     walled: bool,
-    /// Number of the next trial move; see [`OneWay::move_of`].
+    /// Number of the next trial move of a single relay in the last phase; see [`OneWay::move_of`].
     moving: u16,
-    /// Number of accepted trial moves.
+    /// Number of accepted trial moves in the last phase.
     moved: u8,
-    /// Lateral offset and altitude before the trial move.
+    /// Lateral offset and altitude of a relay before its current trial move.
     kept: Cell,
-    /// Segment whose moves are in memory.
+    /// Number of the segment whose computed moves are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
@@ -143,7 +147,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// State before the first call: all bytes 0, no flash.
+    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
     const NEW: Self = Self {
         number: 0,
         start: Start::Arch {
@@ -194,8 +198,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::NONE;
     }
 
-    /// Stores the lateral offset and altitude of relay `index`. A segment's first relay also stores `x_m`, the previous
-    /// x.
+    /// Stores the lateral offset and altitude `cell` of relay `index`. For the first relay of a segment it also stores
+    /// `x_m`, the x of the previous relay, m.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -204,7 +208,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.set(index, cell);
     }
 
-    /// Returns the state of the segment beginning at `index`.
+    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins there.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -213,13 +217,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Solvers both ways: 1 with `altitude` and `reverse`, else 0.
+/// Number of solvers for both directions: 1 with the features `altitude` and `reverse`, else 0.
 const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
-/// Solvers for unequal time slots: 1 with `altitude`, else 0.
+/// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is as long as its hop
+/// needs.
 const FITTED: usize = ALTITUDE as usize;
 
-/// Joint solver: one of three kinds, which share memory.
+/// Joint solver of a chain: the solver for one direction, for both directions, or for fitted slots.
+///
+/// A mission needs only one of the three, so they share their memory.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -235,22 +242,25 @@ enum Way<const RELAYS: usize, const SEGMENTS: usize> {
     Fitted([Fitted<RELAYS>; FITTED]),
 }
 
-/// Joint solver of at most `RELAYS` relays. `SEGMENTS` is at least a tenth of it.
+/// Joint solver of a chain of at most `RELAYS` relays, for one direction or both.
+///
+/// `SEGMENTS` is at least a tenth of `RELAYS`, since a segment has ten relays.
 #[derive(Clone, Debug)]
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize>(Way<RELAYS, SEGMENTS>);
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// State before [`Solver::begin`].
+    /// Initial state of the solver, before [`Solver::begin`] prepares it for a mission.
     pub(crate) const NEW: Self = Self(Way::OneWay(OneWay::NEW));
 
-    /// Creates a joint solver; `None` if the mission does not allow it. Not in an interference field, nor without the
-    /// feature `altitude`.
+    /// Creates a joint solver. `None` for an interference field, for more than `RELAYS` relays, or without the feature
+    /// `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let mut solver = Self::NEW;
         solver.begin(mission).then_some(solver)
     }
 
-    /// Prepares the solver; false if the mission does not allow it.
+    /// Prepares the solver for the directions of `mission`. Returns false for an interference field, or for too many
+    /// relays.
     #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
         if mission.fitted_gap() > 0.0 {
@@ -270,20 +280,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the solved lateral offset and altitude of relay `index`.
+    /// Returns the lateral offset and altitude of relay `index`, once the chain is solved. `seat` is that relay's
+    /// profile.
     pub fn at(&self, index: u16, seat: Seat) -> CrossSection {
         let cell = self.cells().map(|cells| cells.get(index));
         cell.unwrap_or_default().place(seat.room)
     }
 
-    /// Returns the largest x with room for later relays, m.
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
+    ///
+    /// Call it once the chain is solved. The limit is equal, to the bit, to the limit that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let chain = Chain::new(mission, seat_of);
         let solved = chain.zip(self.cells());
         solved.map_or(0.0, |(chain, cells)| cells.end_m(&chain, index))
     }
 
-    /// Returns true if some relays cannot take their farthest x.
+    /// Returns true if some relays have to stay short of their farthest x to meet the target found.
     pub const fn holds_back(&self) -> bool {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,
@@ -292,7 +305,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Continues by one step; `Ready` with the linear target SIR. `seat_of` must always return the same.
+    /// Continues to solve the chain by one bounded step. For one direction a step handles ten relays of a pass that
+    /// moves them, or twenty of another pass. For both directions it handles at least two relays.
+    ///
+    /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
+    /// must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target can be met.
@@ -312,7 +329,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solved.unwrap_or(Poll::Ready(Err(Infeasible)))
     }
 
-    /// Returns the solved position and time slots; `None` for equal slots.
+    /// Returns the position of relay `index` and its slots, once the chain is solved. `None` unless the mission has
+    /// fitted slots.
     pub fn fitted(
         &self,
         mission: &Mission,
@@ -327,7 +345,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that the stored best chain equals a second computation.
+/// Checks that the stored best chain equals the best chain computed a second time.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -359,7 +377,7 @@ mod tests {
         }
     }
 
-    /// Returns a random mission and some fixed altitudes.
+    /// Returns a random mission, and the fixed altitudes of some of its relays.
     fn random(rng: &mut Rng) -> (Mission, [Option<f32>; 50]) {
         let relays = [1, 2, 3, 5, 8, 13, 21, 50][(rng.next() * 8.0) as usize];
         let least_m = rng.between(10.0, 60.0);
@@ -399,7 +417,9 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solver's result as bits, and the number of calls. `once_more` computes the best chain again.
+    /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is the
+    /// target, the others are each relay's lateral offset and altitude. If `once_more` is true, the best chain is
+    /// computed again instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -433,8 +453,8 @@ mod tests {
         (bits, portions)
     }
 
-    /// Checks the stored best chain against one computed again, to the bit. `UAV_RELAY_KEPT` missions are tried, 150 by
-    /// default.
+    /// Checks for random missions that the stored best chain equals one computed a second time, to the bit. The
+    /// environment variable `UAV_RELAY_KEPT` sets the number of missions, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;

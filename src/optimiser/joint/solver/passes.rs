@@ -21,7 +21,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Computes `segment`'s moves; returns the previous relay's value function. `None` if a hop cannot meet the target.
+    /// Computes the policies (moves) of the relays in `segment`. Returns the value function of the relay before the
+    /// segment, which is at `before`.
+    ///
+    /// `None` if a hop cannot meet the target. Bounded by ten relays.
     pub(super) fn recall(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -88,7 +91,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the position of the relay before `segment`.
+    /// Returns the position of the relay before `segment` in the current chain.
     pub(super) fn nominal_before(&self, chain: &Chain<'_, impl SeatOf>, segment: u8) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
@@ -102,7 +105,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Continues to move relays by one segment; `kept` stores them.
+    /// Continues the forward pass by one segment, or first computes the moves of its relays. The pass tries the
+    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept` is true.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -143,7 +147,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share`. `None` if a hop cannot meet `target`.
+    /// Moves the relays of `segment` by the fraction `share` of their computed moves. Stores their new lateral offsets
+    /// and altitudes if `kept` is true. `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -177,14 +182,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays per call when only x is computed.
+/// Number of relays per call in a pass that computes only their x.
 const PLAIN: u16 = 20;
 
-/// Largest penalty of a feasible chain, in Tx-Rx distances.
+/// Maximum penalty for relays too near the interferer at which an improved chain counts as feasible. The unit is the
+/// distance from Tx to Rx.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Continues to compute x for the target `sigma`; `kept` stores. The result is the slack, m, or `None` if missed.
+    /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and
+    /// altitudes stay unchanged. Stores the chain if `kept` is true. At the end of the pass returns the chain's slack,
+    /// m, or `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -221,7 +229,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index` as receiver. [`Start::Through`] has no separation.
+    /// Returns relay `index` with its hop from a relay at `from`. Initial chains of the kind [`Start::Through`] have no
+    /// minimum separation.
     pub(super) fn link<'a>(
         &self,
         chain: &Chain<'a, impl SeatOf>,
