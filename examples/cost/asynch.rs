@@ -1,4 +1,4 @@
-//! Cost of the runners around a relay for a whole sweep, with polled and asynchronous ports.
+//! Cost of the drivers of a relay's ports for one sweep message, polled and asynchronous.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -18,7 +18,7 @@ use super::missions::mission;
 /// Bit rate of the ports, bit/s.
 const BAUD: u32 = 115_200;
 
-/// Serial port in memory. `coming` is a frame and the range of its unread bytes; `gone` counts sent bytes.
+/// Serial port in memory. `coming` is the received frame with the range of its unread bytes; `gone` counts sent bytes.
 struct Memory {
     coming: Cell<([u8; MAX_FRAME], usize, usize)>,
     gone: Cell<usize>,

@@ -75,7 +75,7 @@ pub(crate) fn auth() {
         "passed_on {}",
         u32::from(sent.is_some_and(|sent| sent.len > 90))
     );
-    // A replay: with a valid tag it takes longest to reject.
+    // The frame is a replay. With a valid tag its rejection takes longest.
     let before = middle.stats().replayed;
     let refused = instructions(|| middle.handle_bytes(now, Port::Upstream, bytes));
     hprintln!("refused {}", refused);

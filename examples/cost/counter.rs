@@ -18,8 +18,7 @@ pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
 /// Above 780 000 instructions the result is wrong, because the counter wraps.
 pub(crate) fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
     let empty = ticks(|| ());
-    // One instruction takes 128 ns: 21.504 ticks at 168 MHz, or 2 688 / 125. The largest count times 125 still fits
-    // in a u32.
+    // One instruction takes 128 ns: 21.504 ticks at 168 MHz, or 2 688 / 125. The largest count times 125 fits in a u32.
     (ticks(work).saturating_sub(empty) * 125 + 1_344) / 2_688
 }
 

@@ -10,7 +10,7 @@ use super::counter::instructions;
 
 /// Measures the instructions for the line from Tx to Rx on earth.
 ///
-/// These are its creation, and the conversion of a position to latitude and longitude and back.
+/// Measured are the creation of the line, and the conversion of a position to latitude and longitude and back.
 #[inline(never)]
 pub(crate) fn flight() {
     let site = Geodetic::from_degrees;

@@ -58,7 +58,7 @@ impl Flight {
     fn run_until_holding(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {
-            // In both directions, so that replies are delivered.
+            // Timers and frames of all relays are handled in both orders, so that replies are delivered.
             for at in [0, 1, 2, 1, 0] {
                 self.drain(at, now);
             }

@@ -6,7 +6,8 @@ use uav_relay::{
     Band, Field, FieldPoint, Interference, Interferer, Mission, MissionConfig, Profile,
 };
 
-/// Channel at 2 GHz with line of sight. Excess losses: 0.1 dB with and 21 dB without line of sight, as factors.
+/// Channel at 2 GHz with line of sight. The excess losses are 0.1 dB with line of sight and 21 dB without, given as
+/// factors.
 pub(crate) const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
     Ok(channel) => channel,
     Err(_) => panic!("a channel parameter is out of range"),
@@ -56,13 +57,13 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
-/// Mission of three relays that carries data in both directions. The relays may choose altitudes of 20 to 300 m.
+/// Mission of three relays that carries data from Tx to Rx and back. The relays may choose altitudes of 20 to 300 m.
 pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
     reverse: 1.0,
     ..*HIGH.config()
 });
 
-/// Mission of three relays at one altitude, with data both ways in fitted slots.
+/// Mission of three relays at one altitude, with data to Rx and back in fitted slots.
 ///
 /// A fitted slot is as long as its hop needs.
 pub(crate) const FITTED: Mission = Mission::new(MissionConfig {
@@ -71,13 +72,13 @@ pub(crate) const FITTED: Mission = Mission::new(MissionConfig {
     ..*BOTH.config()
 });
 
-/// Mission of three relays at altitudes of 20 to 300 m, with data both ways in fitted slots.
+/// Mission of three relays at altitudes of 20 to 300 m, with data to Rx and back in fitted slots.
 pub(crate) const FITTED_HIGH: Mission = Mission::new(MissionConfig {
     fitted_gap: 2.0,
     ..*BOTH.config()
 });
 
-/// Mission of three relays that may choose altitudes, and lateral offsets up to 280 m to either side.
+/// Mission of three relays that may choose altitudes, and lateral offsets up to 280 m left and right.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,
@@ -105,7 +106,7 @@ pub(crate) const POINTS: [FieldPoint; 4] = [
     },
 ];
 
-/// Mission of three relays with a known interference along x that varies.
+/// Mission of three relays with an interference that varies along x and is known.
 pub(crate) const UNEVEN: Mission = Mission::new(MissionConfig {
     interference: Interference::Field(Field::new(&POINTS)),
     ..*mission(3).config()

@@ -35,7 +35,7 @@ pub(crate) fn reach() {
 
 /// Measures the instructions of `Hop::reach` (farthest position with a target SIR) with receiver noise.
 ///
-/// The noise is 1e-4 to 100 times the interference 100 m from the interferer.
+/// The noise power is 1e-4 to 100 times the interference power at 100 m from the interferer.
 fn reach_in_noise() {
     const LEVELS: usize = 4;
     let mut all = [0; LEVELS * 30];
@@ -68,7 +68,7 @@ fn reach_in_noise() {
 
 /// Instructions of the most expensive calls that handle a sweep message and its verdict.
 ///
-/// A sweep message carries the search for positions along the chain; the verdict returns the result.
+/// A sweep message tries several target SIRs along the chain; the verdict brings the result back.
 struct SweepCost {
     begin: u32,
     through: u32,
@@ -81,7 +81,7 @@ struct SweepCost {
     settled: bool,
 }
 
-/// Prints the costs of a sweep (search for positions), for traffic in one and in both directions.
+/// Prints the costs of a sweep (search for positions), for traffic to Rx only, and to Rx and back.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
@@ -209,7 +209,8 @@ pub(crate) fn deframe() {
 
 /// Measures the instructions for relay 1 of 100 to predict the target SIR.
 ///
-/// It does this in several calls before its first message. Prints the most expensive call, and the number of calls.
+/// Relay 1 does this in several calls before its first message. Prints the most expensive call, and the number of
+/// calls.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);

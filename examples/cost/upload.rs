@@ -26,7 +26,7 @@ pub(crate) fn upload() {
     if ground.upload(now, upload).is_err() {
         return;
     }
-    // Handshakes come first. The frame after which the relay holds an upload is the offer.
+    // Handshakes come first. The offer is the frame after which the relay has stored an upload.
     loop {
         while let Some(len) = ground.poll_transmit(&mut frame) {
             let bytes = frame.get(..len).unwrap_or_default();

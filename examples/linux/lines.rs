@@ -92,14 +92,15 @@ pub struct Fifo {
     partial_line: PartialLine,
 }
 
-/// Incomplete line. A line longer than [`LONGEST`] is cut to `LONGEST + 1` bytes, which shows that it was too long.
+/// Incomplete line. A line longer than [`LONGEST`] is cut to `LONGEST + 1` bytes, by which the caller recognises it as
+/// too long.
 #[derive(Debug, Default)]
 pub struct PartialLine(Vec<u8>);
 
 impl PartialLine {
     /// Appends received bytes, and passes each complete line to `line`, without its line feed.
     ///
-    /// A longer line is cut to `LONGEST + 1` bytes.
+    /// A line longer than [`LONGEST`] is cut to `LONGEST + 1` bytes.
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
         for &byte in bytes {
             if byte == b'\n' {
@@ -119,7 +120,7 @@ impl Fifo {
     /// One line that names `option` and the fault.
     pub fn open(option: &str, path: &Path) -> Result<Self, String> {
         let name = format!("{option} {}", path.display());
-        // Also opened for writing, so that no end of file occurs when a writer leaves.
+        // The FIFO is also opened for writing, so that no end of file occurs when a writer closes it.
         let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
         let fd = open(path, flags, Mode::empty()).map_err(|error| format!("{name}: {error}"))?;
         let kind = fstat(&fd).map(|stat| FileType::from_raw_mode(stat.st_mode));

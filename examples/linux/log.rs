@@ -50,7 +50,7 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Request for a confirmation through the channel, once all earlier lines are written or dropped.
+    /// Request for a confirmation through the channel, after all earlier lines were written or dropped.
     Flush(SyncSender<()>),
 }
 
@@ -80,7 +80,7 @@ impl Log {
             Some(path) => {
                 appended(path).map_err(|error| format!("--log-file {}: {error}", path.display()))?
             }
-            // Not `Stdout`: to flush its buffer at exit could block forever.
+            // `Stdout` is not used, because its flush at exit could block forever.
             None => std::io::stdout()
                 .as_fd()
                 .try_clone_to_owned()
@@ -142,7 +142,7 @@ impl Log {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 
-    /// Waits until all log lines are written, at most for `at_most`.
+    /// Waits until all log lines are written, for at most the time `at_most`.
     pub fn flush(&self, at_most: Duration) {
         let end = Clock::now() + at_most;
         let (done, flushed) = sync_channel(1);
@@ -165,7 +165,7 @@ fn appended(path: &Path) -> std::io::Result<File> {
 struct Writer {
     file: File,
     path: Option<PathBuf>,
-    /// True if the last line was written only partly, for example on a full disk.
+    /// True if only a part of the last line was written, for example on a full disk.
     torn: bool,
     /// Number of dropped lines already reported in the log.
     reported_drops: u64,

@@ -169,7 +169,7 @@ impl MissionOptions {
     }
 }
 
-/// Checks a mission's parameters. Option names in error messages begin with `prefix`: "--" or "--new-".
+/// Checks a mission's parameters. In error messages, `prefix` comes before the option's name: "--" or "--new-".
 ///
 /// # Errors
 /// One line that names the option and the fault.
@@ -182,7 +182,7 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
         band,
         ..
     } = config;
-    // The error about the separation needs two relays or more.
+    // The error about the separation occurs only with two or more relays.
     let gaps = relays.saturating_sub(1).max(1);
     Mission::try_new(config).map_err(|error| match error {
         MissionError::TooManyForDistance => format!(

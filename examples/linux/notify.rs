@@ -16,7 +16,7 @@ pub struct Notify {
 }
 
 impl Notify {
-    /// Opens the socket that `NOTIFY_SOCKET` names; `None` if that is unset, or cannot be reached.
+    /// Opens the socket that `NOTIFY_SOCKET` names; `None` if it is not set or not reachable.
     ///
     /// Without it the program runs without notifications.
     pub fn open() -> Option<Self> {
@@ -36,7 +36,8 @@ impl Notify {
         self.send("READY=1");
     }
 
-    /// Reports to systemd's watchdog if due. Returns the time of the next report; `None` without a watchdog.
+    /// Reports to systemd's watchdog if a report is due. Returns the time of the next report; `None` without a
+    /// watchdog.
     pub fn tend(&mut self, now: Instant) -> Option<Instant> {
         let every = self.every?;
         if self.due <= now {

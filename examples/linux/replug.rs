@@ -32,12 +32,12 @@ pub struct Replug {
     tap: Option<Tap>,
 }
 
-/// Traffic counters of a tty: bytes, and number of failures, for example when it was unplugged.
+/// Traffic counters of a tty: bytes, and number of failures, for example because the tty was unplugged.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     read: u64,
     written: u64,
-    /// Number of bytes to send that were discarded while the tty was missing.
+    /// Number of bytes discarded instead of sent, while the tty was missing.
     lost: u64,
     times_gone: u32,
 }
@@ -65,7 +65,7 @@ impl Replug {
         self.tap = Some(tap);
     }
 
-    /// Adds a comment on an act of the operator to the next frame in the capture, if any.
+    /// If there is a capture, adds a comment about an operator's command to its next frame.
     pub fn note(&mut self, note: &str) {
         if let Some(tap) = &mut self.tap {
             tap.note(note);
@@ -178,7 +178,8 @@ impl SerialPort for Replug {
         let count = tty.read(into)?;
         if count > 0 {
             self.counts.read += count as u64;
-            // Only received bytes reset the pause: a tty that fails right after opening is not retried more often.
+            // Only received bytes reset the pause. So a tty that fails right after each opening is retried less and
+            // less often.
             self.pause = FIRST;
             if let Some(tap) = &mut self.tap {
                 tap.take(Direction::In, into.get(..count).unwrap_or_default());
@@ -189,7 +190,7 @@ impl SerialPort for Replug {
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
         let Some(tty) = &mut self.tty else {
-            // The bytes would be outdated when the tty is back.
+            // The bytes would be outdated by the time the tty is back.
             self.counts.lost += bytes.len() as u64;
             return Ok(bytes.len());
         };

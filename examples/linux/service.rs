@@ -80,8 +80,8 @@ impl Service {
     ///
     /// Returns the time by which the next call is due, if any.
     ///
-    /// `answer` answers a request: its argument is `None` for the status, else a command and its sender. `who` names
-    /// the program in the log line after a SIGHUP.
+    /// `answer` returns the answer to a request. Its argument is `None` for a request of the status, otherwise a
+    /// command and its sender. `who` names the program in the log line after a SIGHUP.
     pub fn tend(
         &mut self,
         time: Instant,
@@ -124,7 +124,7 @@ impl Service {
     ) -> (Vec<PollFlags>, bool) {
         let time = self.now();
         let span = wake.map(|at| Duration::from_micros(at.since(time).as_micros()));
-        // A time too long for a Timespec means no limit.
+        // A time that is too long for a `Timespec` counts as no limit.
         let timeout = span.and_then(|span| Timespec::try_from(span).ok());
         let mut ttys: Vec<&mut Replug> = ttys.filter(|tty| tty.is_open()).collect();
         let on_ttys = ttys.iter().filter_map(|tty| tty.interest());
@@ -141,7 +141,7 @@ impl Service {
         let result = poll(&mut fds, timeout.as_ref());
         let mut found: Vec<PollFlags> = fds.iter().map(PollFd::revents).collect();
         if !matches!(result, Ok(_) | Err(Errno::INTR)) {
-            // poll(2) has failed, for example for want of memory: the program goes on.
+            // poll(2) has failed, for example for lack of memory. The program continues.
             std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
             found.fill(PollFlags::empty());
         }
@@ -176,8 +176,8 @@ impl Service {
     }
 }
 
-/// Registers the signals that the program handles. SIGXFSZ becomes a write error, like a full disk, and does not end
-/// the program.
+/// Registers the signals that the program handles. A SIGXFSZ then causes a write error, like a full disk, and does not
+/// end the program.
 fn signals() -> std::io::Result<SignalDelivery<UnixStream, SignalOnly>> {
     signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let (ours, theirs) = UnixStream::pair()?;

@@ -27,7 +27,7 @@ impl SiteOptions {
         Some(Sites { tx, rx })
     }
 
-    /// Returns the Tx and Rx positions, if given. Checks that they are `distance_m` apart.
+    /// Returns the Tx and Rx positions, if given. Checks that the distance between them is `distance_m`, m.
     ///
     /// # Errors
     /// One line that names the option and the right distance.

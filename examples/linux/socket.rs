@@ -17,7 +17,7 @@ use crate::lines::LONGEST;
 /// Maximum number of connections accepted per call of [`StatusSocket::questions`].
 const ANSWERS: usize = 4;
 
-/// Maximum number of incomplete requests. With more, the oldest count as complete.
+/// Maximum number of incomplete requests. If there are more, the oldest ones count as complete.
 const CLIENTS: usize = 16;
 
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -107,7 +107,7 @@ impl StatusSocket {
 impl Client {
     /// Reads from the client; returns true if the request is complete.
     ///
-    /// A request ends with a line, the end of the stream, too many bytes or a timeout.
+    /// A request is complete after a line feed, the end of the stream, too many bytes or a timeout.
     fn is_complete(&mut self, now: Instant) -> bool {
         let mut bytes = [0; LONGEST];
         let has_ended = match self.stream.read(&mut bytes) {

@@ -40,7 +40,7 @@ fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
 ///
 /// The file is updated before the epoch is used, so that no epoch is used twice, even after a power failure.
 ///
-/// Without a file the epoch is the clock's seconds since 1970, so that it does not restart from 1.
+/// Without a file the epoch is the clock's seconds since 1970, so that a lost file does not restart the epochs at 1.
 ///
 /// # Errors
 /// One line that names the file and the fault.
@@ -76,8 +76,8 @@ type Done = (std::io::Result<()>, Span);
 
 /// File with one record and a CRC-32C. A separate thread writes it, so that a slow disk never blocks the program.
 ///
-/// After a failed write the program flies on. The failure is logged once and counted, and the write is retried every
-/// second.
+/// After a failed write the program keeps flying the drone. The failure is logged once and counted, and the write is
+/// retried every second.
 #[derive(Debug)]
 pub struct StoredFile {
     option: &'static str,
@@ -86,7 +86,7 @@ pub struct StoredFile {
     done: Receiver<Done>,
     /// Socket that becomes readable when a write has ended, for poll(2).
     ended: UnixStream,
-    /// Newest record, written or not, if any.
+    /// Newest record, whether or not it is written; `None` without a record.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
     /// Record of the last completed write, successful or not.
@@ -117,7 +117,7 @@ impl StoredFile {
                 if results.send((result, begun.elapsed())).is_err() {
                     return;
                 }
-                // There is room for this byte: the previous one was read together with its result.
+                // The socket has room for this byte, because the previous byte was read together with its result.
                 let _ = end.write(&[0]);
             }
         };
@@ -143,7 +143,7 @@ impl StoredFile {
         })
     }
 
-    /// Begins to write `record`, unless it is already written. Returns true once the write has ended or failed.
+    /// Begins to write `record`, unless it is already written. Returns true once its write has succeeded or failed.
     ///
     /// After a failure the program flies on: a drone in the air must not become silent because of a full disk.
     pub fn store(&mut self, record: &[u8]) -> bool {

@@ -1,6 +1,6 @@
 //! Capture of the traffic with the neighbours, for `cargo decode` and Wireshark.
 //!
-//! A separate thread writes it, so a slow disk blocks nothing. What exceeds the queue is left out and counted.
+//! A separate thread writes it, so a slow disk blocks nothing. Traffic that exceeds the queue is left out and counted.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -17,7 +17,7 @@ use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, Interface};
 use crate::log::Log;
 use crate::replug::Replug;
 
-/// Maximum number of reads and writes that wait for the writer thread; further ones are not captured.
+/// Maximum number of reads and writes that wait for the writer thread. More than these are not captured.
 const QUEUE: usize = 1_024;
 
 const MAX_CAPTURES: u32 = 9_999;
@@ -91,7 +91,7 @@ impl Tap {
         self.is_over
     }
 
-    /// Returns the error that ended the capture. Only one port returns it, once.
+    /// Returns the error that ended the capture. One port alone returns it, and only once.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let was_reported = self.state.is_reported.swap(true, Ordering::Relaxed);
@@ -144,7 +144,7 @@ pub fn attach<'a>(
     }
     capture.flush().map_err(wrong)?;
     std::thread::spawn(move || {
-        // The taps notice the closed channel.
+        // Each `Tap` notices that the channel is closed.
         if let Err(error) = write(&mut capture, &interfaces, &receiver) {
             _ = state.fault.set(error.to_string());
         }

@@ -16,7 +16,7 @@ use uav_relay::serial::{Fault, SerialPort};
 pub struct Tty {
     fd: OwnedFd,
     name: String,
-    /// True after a partial write: the tty is full.
+    /// True after a partial write, because the tty's buffer is full.
     full: bool,
     failure: Option<String>,
 }
@@ -77,7 +77,7 @@ impl Tty {
             .get_or_insert_with(|| format!("{name}: {what}"));
     }
 
-    /// Returns the number of transferred bytes; `None` if the call must be repeated later.
+    /// Returns the number of transferred bytes; `None` if the caller must repeat the call later.
     fn done(&mut self, result: Result<usize, Errno>) -> Result<Option<usize>, Fault> {
         match result {
             Ok(count) => Ok(Some(count)),
@@ -125,18 +125,18 @@ impl SerialPort for Tty {
     }
 
     fn has_left(&mut self) -> Result<Option<bool>, Fault> {
-        // Only for a driver-enable pin; for a tty the kernel does that (TIOCSRS485).
+        // Needed only for a driver-enable pin. For a tty the kernel drives such a pin (TIOCSRS485).
         Ok(None)
     }
 }
 
 fn configured(path: &Path, baud: u32) -> Result<OwnedFd, Errno> {
-    // Non-blocking from the start, because opening must not wait for a carrier.
+    // The tty is opened as non-blocking, because opening must not wait for a carrier.
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let fd = open(path, flags, Mode::empty())?;
     let mut line = tcgetattr(&fd)?;
-    // Two readers would each get a part of every frame. Terminal programs use this lock, too; it ends with the
-    // process.
+    // Two readers would each get a part of every frame. The lock prevents this. Terminal programs use it as well, and
+    // it ends with the process.
     flock(&fd, FlockOperation::NonBlockingLockExclusive)?;
     line.make_raw();
     line.input_modes -= InputModes::IXOFF | InputModes::IXANY;

@@ -63,7 +63,7 @@ pub(crate) struct AutopilotPlan {
     pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
-    /// Neighbour that the drone's directional antenna points to; `None` without such an antenna.
+    /// Side to which the drone's directional antenna points; `None` without such an antenna.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
     /// Flight time with a full battery, s (NaN if unknown), return speed and descent speed, m/s.
@@ -107,7 +107,7 @@ pub(crate) struct Companion {
     state: Option<&'static str>,
     answers: AnswerMonitor,
     off_line: OffLineMonitor,
-    /// Lost relays that have landed, as the operator has reported over MAVLink, until `take_cleared`.
+    /// Numbers of lost relays that the operator has reported as landed over MAVLink. `take_cleared` empties the list.
     cleared: Vec<u16>,
 }
 
@@ -137,7 +137,7 @@ impl Companion {
         })
     }
 
-    /// Logs the autopilot's port, the drone's speed limit, and if frames are signed.
+    /// Logs the autopilot's port, the drone's speed limit, and whether frames are signed.
     pub(crate) fn started(&self, log: &Log) {
         let (place, pace) = (&self.plan.port, self.plan.pace);
         let from = match place {
@@ -231,7 +231,7 @@ impl Companion {
 
     /// Reports a drone that is far from the line Tx to Rx or outside its geofence, if a report is due.
     ///
-    /// The report is logged; some reports also go to the operator.
+    /// Every report is logged, and some are also sent to the operator.
     fn check_fence(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
@@ -253,7 +253,7 @@ impl Companion {
         }
     }
 
-    /// Logs that no autopilot has been found since the start, once for each kind of received data.
+    /// If no autopilot has been found since the start, logs this once for each kind of received data.
     fn log_unanswered(&mut self, now: Instant, log: &Log) {
         let received = self.received_kind();
         if let Some(missing) = self.answers.check(now, received) {
@@ -265,7 +265,7 @@ impl Companion {
 
     /// Returns the kind of received data, for example noise; `None` once the autopilot is found.
     fn received_kind(&self) -> Option<Received> {
-        // A rejected signature is logged separately.
+        // A rejected signature is logged elsewhere.
         if self.link.state() != State::Silent || self.link.refused() > 0 {
             return None;
         }
@@ -510,7 +510,7 @@ const fn mistrusted(why: Mistrust) -> &'static str {
 
 /// Returns this machine's time as a timestamp of MAVLink signatures.
 ///
-/// If this clock is behind the autopilot's, the link counts on from the autopilot's timestamps.
+/// If this clock is behind the autopilot's, the link continues from the autopilot's timestamps.
 pub(crate) fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());

@@ -24,7 +24,7 @@ const LOGGED: Duration = Duration::from_millis(10_000);
 
 /// Maximum wait of a starting relay for its drone's endurance (remaining flight time).
 const FIRST: Duration = Duration::from_millis(10_000);
-/// Maximum wait of a starting relay from the first low endurance until its departure is confirmed.
+/// Maximum wait of a starting relay, from the first low endurance to the confirmation of the departure.
 const CONFIRMED: Duration = Duration::from_millis(20_000);
 
 /// State of the relay's departure from the chain because of its battery, as last logged.
@@ -40,7 +40,7 @@ pub(crate) struct Battery {
     has_reserve: bool,
     /// Last time at which the endurance was known or not needed.
     ///
-    /// It is not needed on the ground, and once the relay knows that it is unknown.
+    /// The endurance is not needed on the ground, nor after the relay was informed that it is unknown.
     known_at: Instant,
 }
 
@@ -60,7 +60,7 @@ impl Battery {
 
     /// Returns true while a starting relay waits for its endurance.
     ///
-    /// A relay that restarts with a low battery then leaves before it takes part in an agreement.
+    /// So a relay that restarts with a low battery leaves the chain before it takes part in an agreement.
     pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
         let left_s = relay.endurance_s(now);
         if left_s.is_some() && left_s < relay.endurance_limit_s() {
@@ -77,7 +77,8 @@ impl Battery {
 
     /// Informs the relay that its endurance is unknown, if none was received for 10 s.
     ///
-    /// Not while the autopilot is silent or the drone is on the ground. The relay reports the unknown endurance.
+    /// Does nothing while the autopilot is silent or the drone is on the ground. The relay reports the unknown
+    /// endurance by an event.
     pub(crate) fn tell_unknown(
         &mut self,
         now: Instant,
@@ -188,7 +189,7 @@ impl Battery {
     }
 }
 
-/// Returns true for a departure that is requested but not yet granted.
+/// Returns true if the departure has been requested, but not granted yet.
 const fn is_pending(departure: Departure) -> bool {
     !matches!(
         departure,

@@ -9,7 +9,7 @@ use uav_relay_scenario::endpoint::Endpoint;
 
 /// Maximum number of attempts of a socket call.
 ///
-/// A call can fail because the peer has refused an earlier datagram.
+/// The reason is that a call can fail because the peer has refused an earlier datagram.
 const ATTEMPTS: usize = 4;
 
 #[derive(Debug)]
@@ -63,7 +63,8 @@ impl Datagrams {
         count
     }
 
-    /// Sends a frame as one datagram. If the kernel's buffer is full, it is dropped: the next one has newer data.
+    /// Sends a frame as one datagram. If the kernel's buffer is full, the frame is dropped, because the next one has
+    /// newer data.
     pub(crate) fn send(&mut self, frame: &[u8]) {
         let count = self.call(|socket| socket.send(frame));
         self.written += count as u64;
@@ -75,8 +76,8 @@ impl Datagrams {
                 // An empty datagram is ignored.
                 Ok(0) => {}
                 Ok(count) => return count,
-                // This error is about an earlier datagram: this one has not been sent, and received ones are still
-                // waiting.
+                // This error is about an earlier datagram. The present one has not been sent, and received datagrams
+                // still wait.
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(_) => break,
@@ -138,7 +139,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// Checks that a refused datagram causes no loss of the next one, sent or received.
+    /// Checks that after a refused datagram the next one is not lost, whether sent or received.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

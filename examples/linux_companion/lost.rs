@@ -1,7 +1,8 @@
 //! Lost relays, and the operator's command to clear them: `clear-lost 3`.
 //!
 //! The guard keeps clear of a silent relay, because its drone may still hover. Only a person can know that it has
-//! landed. The guard frees all relays on one side at once, so the command must name every lost relay on that side.
+//! landed. The guard stops keeping clear of all relays on one side at once, so the command must name every lost relay
+//! on that side.
 
 use std::collections::BTreeSet;
 
@@ -107,7 +108,7 @@ impl Lost {
 
     /// Parses the number of a relay that a command reports as landed.
     ///
-    /// It is an error if that is this relay, or if this relay still receives it.
+    /// Returns an error if the number is that of this relay, or of a relay that it still receives.
     fn number(&self, relay: &Relay, word: &str) -> Result<u16, String> {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
@@ -133,7 +134,7 @@ impl Lost {
 
 /// Logs an operator's command and its result; returns the answer.
 ///
-/// `done` has the event's name and text.
+/// `done` has the name and the text of the logged event.
 pub(crate) fn log_command(
     now: Instant,
     log: &Log,

@@ -14,12 +14,13 @@ const STEP_M: f32 = 0.5;
 
 /// Maximum distance of an arrived drone from its agreed position, m.
 ///
-/// Autopilots hover up to 0.9 m off their target.
+/// Autopilots hover up to 0.9 m away from their target.
 const NEAR_M: f32 = 1.0;
 
 /// Time without a change of the setpoint after which a move has ended.
 ///
-/// A drone near its position counts as arrived after the same time, because it may first fly past it.
+/// A drone near its agreed position counts as arrived only after the same time, because it may fly past the position
+/// first.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -32,7 +33,7 @@ pub(crate) enum Step {
 /// Log of a drone's moves: logged setpoint, newest setpoint, and progress.
 #[derive(Debug)]
 pub(crate) struct Movement {
-    /// True if only changes above [`STEP_M`] and the end of each move are logged.
+    /// True if only setpoint changes above [`STEP_M`] and the end of each move are logged.
     is_sparse: bool,
     logged: Option<Placement>,
     newest: Option<Placement>,
@@ -206,7 +207,7 @@ mod tests {
         }
     }
 
-    /// Checks the lines of a setpoint that moves by 0.1 m every 0.2 s: every 0.6 m, and the end.
+    /// Checks the lines of a setpoint that moves by 0.1 m every 0.2 s: one every 0.6 m, and one at the end.
     ///
     /// A small later change is not logged.
     #[test]
@@ -230,7 +231,7 @@ mod tests {
 
     /// Checks that a drone which flies past its goal and back is logged as arrived once.
     ///
-    /// To be near the goal for less than 2 s is no arrival.
+    /// A stay near the goal of less than 2 s does not count as arrival.
     #[test]
     fn a_drone_that_stays_has_arrived_once() {
         let mut movement = Movement::new(true);

@@ -22,7 +22,7 @@ const FENCE_M: f64 = 100.0;
 
 /// Minimum ratio of two distances for the log to suggest swapped latitude and longitude.
 ///
-/// The drone's distance from the line is divided by its distance from the line with swapped coordinates.
+/// The ratio is the drone's distance from the line, divided by its distance from the line with swapped coordinates.
 const NEARER: f64 = 10.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -61,7 +61,7 @@ impl OffLineMonitor {
         fresh.map(|(_, place)| place)
     }
 
-    /// Returns the report on a drone far from the line Tx to Rx, `off_line`. `sites` are the Tx and Rx positions.
+    /// Returns the report on the drone at `off_line`, far from the line Tx to Rx. `sites` are the Tx and Rx positions.
     pub(crate) fn line_report(&mut self, sites: Sites, off_line: OffLine) -> Option<OffLineReport> {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
@@ -284,13 +284,13 @@ mod tests {
         assert!(swapped.kind == Kind::Line && swapped.is_swapped);
         let text = swapped.to_string();
         assert!(text.ends_with("km from the line between transmitter and receiver: are latitude and longitude swapped?"), "{text}");
-        // Line from Tx to Rx in another valley.
+        // The line from Tx to Rx is in a different valley.
         let other = off(site(46.54, 7.40), site(46.55, 7.41), drone).expect("off");
         assert!(other.kind == Kind::Line && !other.is_swapped);
         assert!(other.to_string().ends_with(
             ": check the mission's sites (positions of Tx and Rx), and the drone's position"
         ));
-        // A longitude above 90 degrees is no latitude, so there is no swapped line.
+        // A longitude above 90 degrees cannot be a latitude, so the swapped line does not exist.
         let far = off(site(47.40, 138.54), site(47.41, 138.55), drone).expect("off");
         assert!(!far.is_swapped);
         for off in [swapped, other, far] {

@@ -226,7 +226,7 @@ impl BatteryOptions {
         self.reserve.map(micros)
     }
 
-    /// Checks that the flight time can be known, and that a full battery outlasts reserve plus replacement.
+    /// Checks that the flight time is known if needed, and longer than reserve plus time of replacement.
     fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
         if let Some(reserve) = self.reserve.filter(|_| !has_source) {
             return Err(format!(
@@ -405,7 +405,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     }))
 }
 
-/// Returns the load of the shared radio channel. Its data rate must suffice for all relays.
+/// Returns the load of the shared radio channel. Returns an error if its data rate does not suffice for all relays.
 fn channel_load(options: &Options) -> Result<ChannelLoad, String> {
     let load = ChannelLoad::of_radios(options.of);
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
@@ -462,7 +462,8 @@ fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, S
     mission::mission(config, "--")
 }
 
-/// Parses the interference along x. Its points are leaked, because the mission refers to them until exit.
+/// Parses the interference along x. The memory of its points is never freed, because the mission refers to them until
+/// exit.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text

@@ -22,7 +22,7 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
-    /// Opens the FIFO `path`. `listens` permits lines with a measured interference.
+    /// Opens the FIFO `path`. If `listens` is true, lines with a measured interference are permitted.
     pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
@@ -97,7 +97,7 @@ impl Positions {
     }
 }
 
-/// Logs if drones are kept apart in flight. This requires `positions`.
+/// Logs whether the guard keeps drones apart in flight. It does so only with `positions`.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
@@ -140,7 +140,7 @@ fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
         let power_w = measured_w(power)?;
         return Ok(Line::Position(None, Some(Sample::Receiver { power_w })));
     }
-    // An invalid time counts as unknown; the relay reports this as an event.
+    // An invalid time counts as unknown, and the relay reports an unknown endurance as an event.
     if let ["endurance", times @ ..] = words.as_slice() {
         let time = |word: &str| word.parse().unwrap_or(f32::NAN);
         return Ok(Line::Endurance(match times {

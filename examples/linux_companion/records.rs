@@ -1,7 +1,7 @@
 //! Records that survive a restart in flight: the relay's votes on views, and the newest upload.
 //!
 //! A vote is on the disk before it is sent, because a relay that forgets a promise could split the chain. While a
-//! thread writes it, nothing is sent; everything else continues. Remove the file before another flight.
+//! thread writes the votes, the relay sends nothing; everything else continues. Remove the file before a new flight.
 //!
 //! Without a valid upload a relay starts with the mission of its options, and receives the newer one from the chain.
 
@@ -100,7 +100,7 @@ pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
 /// Begins to store an uploaded mission. If that fails, the relay flies the mission all the same.
 pub(crate) fn store_upload(file: &mut StoredFile, upload: &Upload) {
     let mut bytes = [0; Upload::LENGTH];
-    // The buffer has room for every upload.
+    // The buffer is large enough for any upload.
     upload.encode(&mut bytes);
     file.store(&bytes);
 }

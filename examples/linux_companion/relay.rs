@@ -45,9 +45,9 @@ struct Flight {
 #[derive(Debug)]
 pub(crate) struct Refusal {
     pub(crate) line: String,
-    /// True if a restart would fail for the same reason, until somebody changes configuration or hardware.
+    /// True if a restart of the program would fail as well, until configuration or hardware is changed.
     ///
-    /// False for a port that may come back by itself.
+    /// False for a missing port, which may come back by itself.
     pub(crate) is_final: bool,
 }
 
@@ -111,7 +111,7 @@ impl Flight {
         let views = options.view_file.as_deref();
         let views = views.map(|file| records::resume_views(file, &mut relay, now));
         let (mut views, has_votes) = views.transpose()?.unzip();
-        // Last of the steps that may fail, so that failed starts leave no files.
+        // This step is the last one that may fail, so that failed starts leave no files.
         if let Some(asked) = &options.capture {
             tap::attach(&log, env!("CARGO_BIN_NAME"), asked, ports.ttys())?;
         }
@@ -135,7 +135,7 @@ impl Flight {
         if has_votes == Some(true) {
             report.votes_restored();
         } else if let Some(views) = &mut views {
-            // Written at once, so that a disk failure is reported before flight.
+            // The votes are written at once, so that a disk failure shows before flight.
             views.store(&relay.view_record().to_bytes());
         }
         Ok(Self {

@@ -57,7 +57,7 @@ impl Report {
         }
     }
 
-    /// Logs the relay's identity, ports and mission digest. The same mission has the same digest.
+    /// Logs the relay's identity, ports and mission digest. Relays with the same mission have the same digest.
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
@@ -331,7 +331,7 @@ impl Report {
     }
 
     fn view_accepted(&self, now: Instant, relay: &Relay) {
-        // A drone keeps its number, but not its place in the chain: that changes when a relay before it is lost.
+        // A drone keeps its number. Its place in the chain changes when a relay between it and Tx is lost.
         let (place, relays) = (relay.index(), relay.mission().relays());
         let view = relay.view().number();
         self.log.event(
@@ -357,7 +357,7 @@ impl Report {
         }
     }
 
-    /// Logs when the relay's fitted slots begin and end, as fractions of the frame.
+    /// Logs the begin and end of the relay's fitted time slots, as fractions of the frame.
     fn log_slots(&self, now: Instant, slots: SlotShares) {
         let said = |name: &str, [begin, end]: [f32; 2]| {
             format!("{name} {:.6} to {:.6}", Exact(begin), Exact(end))

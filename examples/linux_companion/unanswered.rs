@@ -4,10 +4,10 @@
 
 use uav_relay::{Duration, Instant};
 
-/// Time without a HEARTBEAT, which an autopilot sends every second, until it is reported as missing.
+/// Time without a HEARTBEAT after which an autopilot is reported as missing. It sends one every second.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(3_000);
 
-/// Kind of data received from the autopilot's port since the start, in ascending order.
+/// Kind of data received from the autopilot's port since the start, from no data to valid data.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Received {
     /// No bytes.
@@ -20,7 +20,7 @@ pub(crate) enum Received {
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Kind of the received data, and the time since when; `None` once the autopilot is found.
+    /// Kind of the received data, and the time of its first reception; `None` once the autopilot is found.
     newest: Option<(Received, Instant)>,
     reported: Option<Received>,
 }

@@ -34,7 +34,7 @@ const POSITION_ERROR_M: f32 = 1.5;
 /// Length of the longest frame to send, bytes.
 const LONGEST: usize = Link::LONGEST_FRAME;
 
-/// Pause before another attempt to write to a full port: 115 bytes are sent meanwhile.
+/// Pause before the next attempt to write to a full port. In this time the UART sends 115 bytes.
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
@@ -51,7 +51,7 @@ pub(crate) struct Autopilot {
 }
 
 impl Autopilot {
-    /// Returns the guard's settings `of` with this drone's position error and stopping time.
+    /// Returns the guard settings `of`, changed to this drone's position error and stopping time.
     #[expect(
         clippy::unnecessary_wraps,
         reason = "an image that does not fly has none"
@@ -66,7 +66,7 @@ impl Autopilot {
 
     /// Creates the autopilot link in static RAM, for the line between `sites`.
     ///
-    /// `None` if the mission does not fit the line.
+    /// `None` if the mission's distance differs from the line's length.
     #[inline(never)] // frees its stack frame
     pub(crate) fn begin(
         uart: Uart,
@@ -110,7 +110,7 @@ impl Autopilot {
     #[inline(never)] // frees its stack frame
     fn receive(&mut self, now: Instant) {
         let mut bytes = [0; 64];
-        // Bytes that arrive meanwhile wake the main loop again.
+        // Bytes that are received during this call wake the main loop again.
         for _ in 0..RECEIVED / bytes.len() {
             match self.port.read(&mut bytes) {
                 Ok(0) => break,
@@ -131,9 +131,10 @@ impl Autopilot {
 
     /// Sends frames with the relay's setpoint to the autopilot. Returns the time by which the next call is due.
     ///
-    /// `now` must be that of the last call of [`listen`](Self::listen).
+    /// `now` must be the time passed to the last call of [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &mut Relay) -> Instant {
-        // The ports have been served since the last exchange, so this sends the newest setpoint without delay.
+        // The relay's ports have been served since the last exchange. So this exchange sends the newest setpoint
+        // without delay.
         self.link.exchange(relay, now);
         while let Some(event) = self.link.poll_event() {
             log::autopilot(event);
@@ -153,7 +154,8 @@ impl Autopilot {
 
 /// Opens the autopilot's port, served by its interrupt.
 ///
-/// The queues are built on the stack before they are moved to static RAM. Not inlined, so that this stack is freed.
+/// The queues are built on the stack before they are moved to static RAM. The function is not inlined, so that this
+/// stack is freed.
 #[inline(never)]
 fn open(uart: Uart) -> Option<Port> {
     Some(port::open(

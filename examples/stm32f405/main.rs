@@ -53,7 +53,7 @@ fn main() -> ! {
     let Some((mut clock, links, uart)) = connect() else {
         board::stop()
     };
-    // A drone without a valid configuration sleeps forever.
+    // A drone without a valid configuration block sleeps forever.
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
@@ -62,7 +62,7 @@ fn main() -> ! {
 
 /// Creates the clock, the links to both neighbours and the autopilot's UART.
 ///
-/// The links are in static RAM. Not inlined, so that its stack frame is freed.
+/// The links are in static RAM. This function is not inlined, so that its stack frame is freed.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(firmware::clock::Clock, &'static mut Links, autopilot::Uart)> {

@@ -59,7 +59,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
         let relay = &mut *drone.relay;
         while let Some(event) = relay.poll_event() {
             log::event(event, relay);
-            // This panic tests the no-panic proof: with it the image must not link.
+            // This panic tests the proof that no panic is reachable: with it the image must not link.
             #[cfg(panic_on_purpose)]
             assert!(
                 relay.setpoint().is_none_or(|place| place.x_m < 1e6),
@@ -77,7 +77,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
             log::counters(relay);
             links.log_counters();
         }
-        // After the links, for the newest state of the neighbours.
+        // This comes after the links are served, so that the state of the neighbours is the newest.
         let soon = drone.autopilot.as_mut();
         let soon = soon.map(|autopilot| autopilot.fly(now, relay));
         let now = clock.now();
@@ -87,7 +87,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
     }
 }
 
-/// Returns no measurement. Replace it by one that returns the newest measurement of your receiver.
+/// Returns no measurement. Replace this function by one that returns the newest measurement of your receiver.
 ///
 /// To estimate the interferer, the relay also needs the drone's position. If the mission has the interference as a
 /// function of x, call `Relay::restart` at the leader after enough samples. The chain then agrees on positions for

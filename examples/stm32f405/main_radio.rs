@@ -24,7 +24,7 @@ fn main() -> ! {
     let Some((mut clock, channel, uart)) = connect() else {
         board::stop()
     };
-    // A drone without a valid configuration sleeps forever.
+    // A drone without a valid configuration block sleeps forever.
     let Some(drone) = drone::begin(Wiring::Shared, uart, clock.now()) else {
         board::stop()
     };
@@ -33,7 +33,7 @@ fn main() -> ! {
 
 /// Creates the clock, the radio channel and the autopilot's UART.
 ///
-/// The channel is in static RAM. Not inlined, so that its stack frame is freed.
+/// The channel is in static RAM. This function is not inlined, so that its stack frame is freed.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(

@@ -14,7 +14,7 @@ use uav_relay::serial::SerialPort as _;
 use crate::executor::Time;
 use crate::firmware::port::Port;
 
-/// Pause before another attempt to write to a full port: 11 bytes are sent meanwhile.
+/// Pause before the next attempt to write to a full port. In this time the UART sends 11 bytes.
 const PAUSE: Duration = Duration::from_millis(1);
 
 pub(crate) struct Rx<'p>(&'p RefCell<Port>);

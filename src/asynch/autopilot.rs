@@ -30,7 +30,7 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// ports, as with [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Signal that starts a data exchange with the relay. Raised after received bytes and events of the relay.
+    /// Signal that starts a data exchange with the relay. Raised by received bytes and by events of the relay.
     exchange_signal: Signal,
     /// Signal that starts the transmission of frames to the autopilot.
     send_signal: Signal,
@@ -88,7 +88,7 @@ impl AsyncAutopilot {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }
 
-    /// Moves bytes between the link and its port, and positions between the link and `relay`, forever.
+    /// Moves bytes between the link and its port, and data between the link and `relay`, forever.
     ///
     /// Join it with the future that runs the relay's ports, or spawn both. Each poll reads the port once
     /// ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that never completes does not delay the
@@ -123,7 +123,7 @@ impl AsyncAutopilot {
                         yield_now().await;
                     }
                 }
-                // The stream has ended but may continue, or a byte was lost, which the checksum detects.
+                // The stream has ended but may continue. Or a byte was lost, which the checksum detects.
                 Ok(0) | Err(_) => clock.sleep_until(clock.now() + PAUSE).await,
             }
         }
@@ -140,7 +140,7 @@ impl AsyncAutopilot {
             }
             wake(&self.listener);
             self.send_signal.raise();
-            // The frames that were sent now are no longer due.
+            // Frames that this exchange has sent are no longer due.
             yield_now().await;
             let due = self.lend(|link| link.poll_timeout(now)).unwrap_or(now);
             let due = due.max(now + PAUSE);
@@ -196,7 +196,7 @@ impl Signal {
         wake(&self.waker);
     }
 
-    /// Clears the signal. The caller must then handle everything that can have raised it.
+    /// Clears the signal. The caller must then handle everything that may have raised the signal.
     fn clear(&self) {
         self.is_raised.set(false);
     }

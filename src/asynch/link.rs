@@ -22,8 +22,7 @@ const PAUSE: u32 = 128;
 
 /// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.
 ///
-/// The first byte time is for a byte that the port can still be sending, the second for the tolerance of the port's
-/// clock.
+/// One byte time is for a byte that the port may still be sending, one for the tolerance of the port's clock.
 const PIN_HOLD: u32 = 2;
 
 /// Delimiter byte at the end of every frame. Sent before a frame, it ends a previous incomplete frame.
@@ -49,7 +48,7 @@ struct Sender<W, D> {
     byte_time: Duration,
     /// Time at which all bytes written so far have left the port, computed from the baud rate.
     quiet_at: Instant,
-    /// True if the last frame is possibly incomplete, because its writing failed or was cancelled.
+    /// True if the last frame is possibly incomplete, because a write failed or was cancelled.
     cut: bool,
 }
 
@@ -80,7 +79,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// Returns the future that receives, the future that sends, and the queue of frames to send.
+    /// Returns two futures, one that receives and one that sends, and the queue of frames to send.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,
@@ -131,8 +130,8 @@ async fn receive<R: Read>(
             Ok(0) => clock.sleep_until(clock.now() + pause).await,
             Err(_) => {
                 relay.count(port, |stats| stats.read_failed(Fault::Other));
-                // Reading continues at once after a single bad byte. But a port that only fails must not block the
-                // other tasks.
+                // Reading continues at once after a single bad byte. But a port whose every read fails must not block
+                // the other tasks.
                 yield_now().await;
                 if !waited {
                     clock.sleep_until(clock.now() + pause).await;
@@ -152,7 +151,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         clock: &impl Clock,
         pause: Duration,
     ) -> Infallible {
-        // The initial state makes the first turn set the pin low.
+        // With this initial state the first iteration sets the pin low.
         let mut high = true;
         let mut frame = [0; MAX_FRAME];
         loop {
@@ -215,8 +214,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the driver-enable pin high or low. Returns true on success, and without a pin. After a failure it waits and
-    /// returns false.
+    /// Sets the driver-enable pin high or low. Returns true on success, and if there is no pin. After a failure it
+    /// waits, then returns false.
     async fn drive(
         &mut self,
         high: bool,
@@ -241,8 +240,8 @@ fn is_empty(waiting: &RefCell<Frames>) -> bool {
     waiting.try_borrow().is_ok_and(|waiting| waiting.is_empty())
 }
 
-/// Moves the next queued frame into `frame`, and completes with its length, bytes. The task that queues a frame wakes
-/// this task.
+/// Moves the next queued frame into `frame`, and completes with its length, bytes. The task that queues a frame must
+/// wake this one.
 fn next<'f>(
     waiting: &'f RefCell<Frames>,
     relay: &'f AsyncRelay<'_>,
@@ -268,8 +267,8 @@ fn next<'f>(
 
 /// Awaits `future`. Returns its output, and true if the future was pending at least once.
 ///
-/// If it was not, the caller must yield to the executor, so that a port that is always ready does not block other
-/// tasks.
+/// If `future` was never pending, the caller must yield to the executor, so that a port that is always ready does not
+/// block other tasks.
 pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;
@@ -339,8 +338,8 @@ pub trait Clock {
     /// Returns the present time since an arbitrary start. It never decreases.
     fn now(&self) -> Instant;
 
-    /// Completes at time `at`, or at once if `at` is in the past. If another event comes first, the future is dropped
-    /// and a new one is created later.
+    /// Completes at time `at`, or at once if `at` is in the past. If a different event comes first, the future is
+    /// dropped, and a new one is created later.
     fn sleep_until(&self, at: Instant) -> impl Future<Output = ()>;
 }
 

@@ -180,8 +180,8 @@ where
         let (rx_down, tx_down, down) = self.downstream.ends(Port::Downstream, relay, clock);
         let queues = [(Port::Upstream, up), (Port::Downstream, down)];
         let runs = run_relay(relay, &queues, clock, &mut store);
-        // The order matters: bytes that were read are used in this turn of the relay, and its frames are written at
-        // once.
+        // The order matters: received bytes reach the relay in this poll, and the resulting frames are written in the
+        // same poll.
         match select5(rx_up, rx_down, runs, tx_up, tx_down).await {
             Either5::First(never)
             | Either5::Second(never)
@@ -233,7 +233,7 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
     }
 }
 
-/// Handles the relay's timers and queues its frames for the ports, forever.
+/// Handles the timers of the relay and queues its frames for the ports, forever.
 async fn run_relay(
     relay: &AsyncRelay<'_>,
     queues: &[(Port, &RefCell<Frames>)],
@@ -277,7 +277,7 @@ fn turn(
     let has_room = |(_, queue): &(Port, &RefCell<Frames>)| {
         queue.try_borrow().is_ok_and(|queue| queue.has_room())
     };
-    // A port without room must not delay the other one, so a frame for it is counted and dropped.
+    // A port without room must not delay the other port. So a frame for it is counted and dropped.
     while queues.iter().any(has_room)
         && let Some(Transmit { port, len }) = of.poll_transmit(now, &mut frame)
     {

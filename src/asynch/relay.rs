@@ -11,11 +11,11 @@ use crate::serial::SerialStats;
 
 /// Relay shared by tasks, the wakers of these tasks, and the counters of the ports.
 ///
-/// All tasks must run on one executor, on one core and at one priority. They do not wait for each other, because none
+/// All tasks must run on one executor, on one core and at one priority. Tasks do not wait for each other, because none
 /// holds the relay across an `await`. An interrupt passes its data to such a task through a channel.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// True if the relay has new input since the task of its ports last ran.
+    /// True if the relay has got new input since the task of its ports last handled it.
     changed: Cell<bool>,
     /// Waker of the task that runs the relay's ports.
     runner: Cell<Option<Waker>>,
@@ -49,7 +49,7 @@ impl<'a> AsyncRelay<'a> {
     /// Passes the relay to `work`, and wakes the task of its ports. For example, `work` reports a position or a sample.
     /// The woken task runs as soon as the calling task waits.
     ///
-    /// Returns `None`, and does nothing, inside the `work` of another call, which already has the relay. Apart from
+    /// Returns `None`, and does nothing, inside the `work` or `look` of a call that already has the relay. Apart from
     /// `work` the call takes constant time.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
@@ -58,12 +58,12 @@ impl<'a> AsyncRelay<'a> {
     }
 
     /// Passes the relay to `look`, which reads for example the setpoint. Does not wake the task of the ports. Returns
-    /// `None` inside the `work` or `look` of another call, which already has the relay.
+    /// `None` inside the `work` or `look` of a call that already has the relay.
     pub fn look<R>(&self, look: impl FnOnce(&Relay) -> R) -> Option<R> {
         self.lend(|relay| look(relay))
     }
 
-    /// Completes with the next event for the firmware. Only one task can wait at a time; a second one replaces the
+    /// Completes with the next event for the firmware. Only one task can wait at a time; a second task replaces the
     /// first. If the future is dropped, no event is lost. Takes constant time per poll.
     pub fn next_event(&self) -> impl Future<Output = Event> + '_ {
         poll_fn(|cx| {
@@ -81,8 +81,8 @@ impl<'a> AsyncRelay<'a> {
         self.counters(port).get()
     }
 
-    /// Passes the relay to `work` without waking the task of the ports. Returns `None` if another call already has the
-    /// relay.
+    /// Passes the relay to `work` without waking the task of the ports. Returns `None` if a different call already has
+    /// the relay.
     pub(super) fn lend<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }
@@ -144,7 +144,7 @@ const ZERO: SerialStats = SerialStats {
     unrouted: 0,
 };
 
-/// Stores the current task's waker in `place`. Does nothing if the stored waker already wakes this task.
+/// Stores the current task's waker in `place`. Does nothing if the stored waker wakes the same task.
 pub(super) fn store_waker(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
     let kept = place.take().filter(|waker| waker.will_wake(cx.waker()));
     place.set(Some(kept.unwrap_or_else(|| cx.waker().clone())));

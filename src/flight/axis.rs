@@ -32,7 +32,7 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Maximum difference between a mission's distance and that of its Tx and Rx positions, m. It covers rounding.
+/// Maximum difference between a mission's distance and the distance of its Tx and Rx positions, m. Allows for rounding.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why the positions of Tx and Rx define no line.
@@ -95,7 +95,7 @@ pub struct Axis {
     up: Vector,
     /// Half the straight distance from transmitter to receiver, m.
     half_chord_m: f64,
-    /// Radius of curvature of the earth's surface along the line, m.
+    /// Radius of curvature of the earth's surface in the direction of the line, m.
     radius_m: f64,
     /// Distance from transmitter to receiver along the ground, m.
     distance_m: f64,
@@ -104,7 +104,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. It applies to all directions:
+    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. It applies in all directions:
     /// sideways, upward, before Tx and beyond Rx.
     pub const AROUND_M: f32 = 5_000.0;
 
@@ -268,7 +268,7 @@ impl Axis {
         })
     }
 
-    /// Returns the point at height 0 that is `x` m along the line from its middle, and `y` m to the right.
+    /// Returns the point at height 0 that is `x` m toward Rx from the line's middle and `y` m to the right.
     fn on_line(&self, x: f64, y: f64) -> Vector {
         let c = chord(x, self.radius_m);
         let sagitta =
@@ -285,12 +285,12 @@ impl Axis {
         narrow(libm::atan2(east, north))
     }
 
-    /// Returns the angle from this line to the line `other`, each at its Tx, radians in [0, π]. Constant work.
+    /// Returns the angle between the directions of this line and `other`, each at its Tx, rad, 0 to π. Constant work.
     pub fn turn_rad(&self, other: &Self) -> f32 {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }
 
-    /// Returns the azimuth of the line at `x_m` plus the angle `aside_rad`, radians in -π to π. Constant work.
+    /// Returns the azimuth of the line at `x_m` plus the angle `aside_rad`, wrapped to -π to π, radians. Constant work.
     pub(super) fn heading_rad(&self, x_m: f32, aside_rad: f32) -> f32 {
         turned(self.azimuth_rad(x_m) + aside_rad)
     }
@@ -306,13 +306,13 @@ impl Axis {
 
     /// Returns the north and east components of the line's direction at `x_m`, as a unit vector.
     fn direction(&self, x_m: f32) -> [f64; 2] {
-        // The tangent turns with the earth's curvature by c / r.
+        // The tangent of the line turns with the earth's curvature, by the angle c / r.
         let c = chord(f64::from(x_m) - self.distance_m / 2.0, self.radius_m);
         let turn = c / self.radius_m;
         let tangent = self.along.minus(self.up.times(turn));
         let normal = self.up.plus(self.along.times(turn)).unit();
-        // North is the projection of the earth's axis onto the ground plane. North and east are each as long as the
-        // cosine of the latitude.
+        // North is the projection of the earth's axis onto the ground plane. Both vectors are as long as the cosine of
+        // the latitude.
         let north = tangent.dot(Vector::POLE.minus(normal.times(normal.z)));
         let east = tangent.dot(Vector::POLE.cross(normal));
         let length = libm::sqrt(north * north + east * east);

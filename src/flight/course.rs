@@ -14,15 +14,14 @@ pub struct Course {
     pub pace: Pace,
 }
 
-/// Reason why the positions of Tx and Rx do not fit the mission.
+/// Reason why the positions of Tx and Rx contradict the mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CourseError {
     /// The positions of the transmitter and the receiver do not define a line.
     Axis(AxisError),
-    /// The distance of Tx and Rx along the ground differs from the mission's distance. The value is the distance along
-    /// the ground, m.
+    /// The distance between Tx and Rx along the ground, m, differs from the mission's distance.
     Distance(f64),
 }
 
@@ -45,7 +44,7 @@ impl Course {
     /// ```
     ///
     /// # Errors
-    /// [`CourseError`] if Tx and Rx define no line, or a line of another length than the mission's.
+    /// [`CourseError`] if Tx and Rx define no line, or a line whose length differs from the mission's distance.
     #[inline(never)] // frees its stack before the relay needs some
     pub fn try_new(sites: Sites, speed_m_s: f32, mission: &Mission) -> Result<Self, CourseError> {
         let axis = Axis::between(sites).map_err(CourseError::Axis)?;

@@ -27,8 +27,8 @@ use crate::wire::message::{Detail, Entry, Hello, Message, Reports};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay after which another node with its node number is accepted. Relays use `Settings::dead_after` for
-/// this.
+/// Silence of a relay after which a different node with the same number is accepted. Relays use `Settings::dead_after`
+/// for this.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which an unanswered hello to the polled relay is repeated.
@@ -37,7 +37,7 @@ const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 /// Maximum number of relays whose reports are stored: 11 KB in all. 0 without the feature `telemetry`.
 const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 
-/// Interval between two requests for the reports of all relays. They go to the relays in reach alternately.
+/// Interval between two requests for the reports of all relays. The relays in reach receive them in turn.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
 /// Number of unanswered hellos to one relay after which the next relay is polled.
@@ -113,8 +113,8 @@ pub struct Ground {
 impl Ground {
     /// Creates a ground station for relays that loaded the mission `base` before flight.
     ///
-    /// `end` is the station's end of the chain: `Upstream` at Tx, `Downstream` at Rx. The epoch (start counter) in
-    /// `auth` must be larger at every start.
+    /// `end` is the end of the chain at which the station stands: `Upstream` at Tx, `Downstream` at Rx. The epoch
+    /// (start counter) in `auth` must be larger at every start.
     pub fn new(base: &Mission, end: Side, network: u16, wiring: Wiring, auth: Auth) -> Self {
         let all = base.relays();
         let reach = match wiring {
@@ -174,7 +174,7 @@ impl Ground {
     /// Starts to upload the mission `upload` to the relays. Replaces an upload in progress.
     ///
     /// # Errors
-    /// Returns [`UploadError::Base`] if the upload is for relays that loaded another mission before flight.
+    /// Returns [`UploadError::Base`] if the upload is for relays that loaded a mission other than this station's.
     pub fn upload(&mut self, now: Instant, upload: Upload) -> Result<(), UploadError> {
         if upload.base() != self.base {
             return Err(UploadError::Base);
@@ -244,7 +244,7 @@ impl Ground {
 
     /// Returns the counters of sent and received frames.
     ///
-    /// `mission` counts frames of relays that loaded another mission before flight, `foreign` frames of other
+    /// `mission` counts frames of relays that loaded a different mission before flight, `foreign` frames of other
     /// networks, `overheard` frames to other nodes.
     pub const fn stats(&self) -> &Stats {
         &self.stats
@@ -253,7 +253,8 @@ impl Ground {
     /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay has proven
     /// that it has the key.
     ///
-    /// After a restart or a new handshake it is false until the relay answers. Work: four relays at most.
+    /// After a restart of the relay or a new handshake, the value is false until the relay answers. Work: four relays
+    /// at most.
     pub fn relays_in_reach(&self) -> impl Iterator<Item = (u16, bool)> {
         let nodes = (1..=self.reach).map(|distance| self.at(distance));
         nodes.map(|node| (node, self.endpoint.knows(node)))
@@ -351,8 +352,8 @@ impl Ground {
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
-        // The refused mission is possibly not the one that the relay has stored. The upload that follows shows which
-        // one that is.
+        // The refused mission is possibly not the one that the relay has stored. The upload that follows shows the
+        // stored one.
         if hello.refused && self.flown.is_some() {
             return;
         }
@@ -378,7 +379,7 @@ impl Ground {
         let mission_id = upload.id();
         self.unanswered = 0;
         self.distance = distance;
-        // A relay does not store a refused mission, which may be another one than this upload.
+        // A relay does not store a refused mission, and this upload may not be the refused one.
         let is_refused = hello.refused && hello.latest_mission == mission_id;
         let holds = if hello.refused && !is_refused {
             MissionId {
@@ -399,14 +400,14 @@ impl Ground {
             && holds.version == mission_id.version
             && matches!(self.progress, Progress::Offering)
         {
-            // Another station has uploaded with the same version. This upload has reached no relay, and is based on an
-            // older mission.
+            // A different station has uploaded a mission with the same version. This upload has reached no relay, and
+            // is based on an older mission.
             Progress::Outdated {
                 version: holds.version,
             }
         } else if holds < mission_id {
-            // A relay also answers an offer with a hello. Only an answer to a query causes an offer. Otherwise the
-            // exchange would not end.
+            // A relay also answers an offer with a hello. Only a hello that answers a query causes an offer. Otherwise
+            // the exchange would not end.
             if core::mem::take(&mut self.query_sent) {
                 self.offer_number = Some(hello.offer_number);
                 self.due = true;
@@ -437,7 +438,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next hello if it is due: to the same relay as before, or to the next one. Takes constant time.
+    /// Schedules the next hello if it is due: to the polled relay, or to the next relay. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if TELEMETRY {
@@ -548,7 +549,7 @@ impl Ground {
     }
 
     /// Writes the interference report to the next relay; `None` if none is pending. If that relay cannot verify frames
-    /// of this station yet, a handshake is written instead.
+    /// of this station yet, a handshake is written in place of the report.
     fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {
@@ -604,8 +605,8 @@ struct Watching {
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
-    /// Distance of the relay to which the last request goes, in relays; 0 without a request. `is_due` is true until it
-    /// is sent.
+    /// Distance of the relay to which the last request goes, in relays; 0 without a request. `is_due` is true until the
+    /// request is sent.
     distance: u16,
     is_due: bool,
     /// Bit mask of the relays received since the last request to them.
@@ -616,7 +617,7 @@ struct Watching {
     known: heapless::Vec<KnownState, REPORTED>,
 }
 
-/// Newest known state of a relay, and its last received details. `at` is the time of the state, on the station's clock.
+/// Newest known state of a relay, and its last received details. `at` is the time of the state by the station's clock.
 #[derive(Clone, Debug)]
 struct KnownState {
     at: Instant,
@@ -781,22 +782,22 @@ pub enum Progress {
         /// station.
         relays: u16,
     },
-    /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the Tx and Rx positions, or
+    /// A relay refuses the mission, so the chain does not fly it. The mission contradicts the Tx and Rx positions, or
     /// that relay's geofence.
     Refused {
-        /// Node number of the relay that reports the refusal. It refuses the mission itself, or a relay farther from
-        /// the station does.
+        /// Node number of the relay that reports the refusal. The mission is refused by this relay, or by one farther
+        /// from the station.
         by: u16,
     },
-    /// A relay has stored a newer mission, or another mission with the same version.
+    /// A relay has stored a newer mission, or a different mission with the upload's version.
     Outdated {
         /// Version of the mission that the relay has stored.
         version: u16,
     },
 }
 
-/// Number of interference reports after which the station repeats its handshake. Without it a restarted relay could not
-/// verify the reports.
+/// Number of interference reports after which the station repeats its handshake. Without a new handshake, a restarted
+/// relay could not verify the reports.
 const REPORTS_PER_HANDSHAKE: u8 = 16;
 
 /// Last interference power measured at the station, and the relays to which it must be reported.

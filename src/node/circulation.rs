@@ -34,13 +34,13 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays on the path compute before they forward. Such messages are twice as
+/// Factor on the wait for a reply if the relays that forward the message compute first. Such messages are twice as
 /// long, and each relay needs up to thirty steps of its computation.
 const SLOW: u32 = 4;
 
 /// Number of retransmissions after which the wait no longer doubles.
 ///
-/// After n retransmissions the wait is 2 << n hop times, at most eight.
+/// The wait after n retransmissions is 2 << n hop times, at most eight.
 const LOG_MOST: u32 = 2;
 
 /// Wait before the first retransmission on a lossy channel, in hop times. The next relay's acknowledgement normally
@@ -61,7 +61,8 @@ pub(crate) enum Stage {
     Completed,
     /// The message was cancelled after it was sent.
     ///
-    /// Duplicates of it are still answered, but a reply to it no longer proves that a neighbour is alive.
+    /// Duplicates of it are still answered, but the neighbour's reply to it no longer proves that the neighbour is
+    /// alive.
     Cancelled,
 }
 
@@ -74,14 +75,15 @@ pub(crate) enum Reply {
     InProgress,
 }
 
-/// Path along the chain from this relay to the relay that replies. Its length determines the retransmission timeout.
+/// Hops along the chain from this relay to the relay that replies. The retransmission timeout follows from their
+/// number.
 #[derive(Clone, Copy)]
 pub(crate) struct Path {
     /// Time to transmit and handle one frame over one hop.
     pub(crate) hop_time: Duration,
     /// Number of hops on the path.
     pub(crate) hops: u16,
-    /// True if the relays on the path compute before they forward the message.
+    /// True if the relays of these hops compute before they forward the message.
     pub(crate) slow: bool,
 }
 
@@ -97,11 +99,11 @@ pub(crate) struct Circulation {
     retries: u8,
     /// True once the next relay has acknowledged the message.
     is_received: bool,
-    /// True if the channel counts as lossy, because this message or one of the last messages was lost.
+    /// True if the channel counts as lossy, because this or a recent message was lost.
     is_lossy: bool,
-    /// Number of further messages for which the channel still counts as lossy.
+    /// Number of later messages for which the channel still counts as lossy.
     lossy_messages: u8,
-    /// Number of times that the reply is still repeated without a request, because the channel is lossy.
+    /// Number of repetitions of the reply still to be sent without a request, because the channel is lossy.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
@@ -126,7 +128,7 @@ impl Circulation {
         }
     }
 
-    /// Returns the state at `stage` with all times zero, for tests without time.
+    /// Test helper: returns the state at `stage`, with all times zero.
     #[cfg(test)]
     pub(crate) const fn at_stage(stage: Stage) -> Self {
         Self {
@@ -174,8 +176,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Records that the result is known, and schedules the reply. `path` leads to the initiator of the message. At the
-    /// initiator itself the path has no hops, and no reply is sent.
+    /// Records that the result is known, and schedules the reply. `path` leads to the initiator of the message. The
+    /// initiator passes a path of no hops, and sends no reply.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -196,8 +198,8 @@ impl Circulation {
 
     /// Cancels the message: it counts as completed, without a result.
     ///
-    /// The time of its transmission is discarded. Otherwise a later message could be taken for the reply, and wrongly
-    /// prove that a neighbour is alive.
+    /// The time of its transmission is discarded. Otherwise a later message could count as the reply, and would wrongly
+    /// prove that the neighbour is alive.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -211,7 +213,7 @@ impl Circulation {
         self.timer = None;
     }
 
-    /// Handles a retransmission of the message by the previous relay. `path` leads to the initiator of the message.
+    /// Handles a repetition of the message from the previous relay. `path` leads to the initiator of the message.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if matches!(self.stage, Stage::Completed | Stage::Cancelled) {
@@ -288,7 +290,7 @@ impl Circulation {
             self.reply_due = Some(Reply::Result);
             return false;
         }
-        // The first retransmission on a lossy channel shows nothing: the neighbour has had no reason yet to reply that it has the message.
+        // The first retransmission on a lossy channel proves no loss: the neighbour has had no reason yet to reply.
         if self.retries > 0 || self.is_received || !self.is_lossy {
             self.is_lossy = true;
             self.lossy_messages = MEMORY;
@@ -303,7 +305,7 @@ impl Circulation {
     }
 }
 
-/// Number of consecutive messages with old sequence numbers that show that the leader has restarted.
+/// After this number of consecutive messages with old sequence numbers, the leader has restarted.
 pub(crate) const SUSPICIOUS: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]
@@ -313,7 +315,7 @@ impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
     /// Counts a message with an old sequence number. Returns true at the fourth such message in a row ([`SUSPICIOUS`]),
-    /// and then restarts the count.
+    /// and then sets the count to zero.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;

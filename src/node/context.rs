@@ -1,4 +1,4 @@
-//! State that every layer receives, effects of one layer on the others, and common durations.
+//! State that every layer receives, effects of one layer on the other layers, and common durations.
 
 use crate::features::ALTITUDE;
 use crate::mission::{Band, Interference, Mission};
@@ -57,7 +57,7 @@ impl Member {
         (place, self.all)
     }
 
-    /// Returns the digest of the active mission and the accepted view. Every message of an agreement on positions
+    /// Returns a digest of the active mission and the accepted view. Every message of an agreement on positions
     /// contains it.
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
@@ -71,7 +71,7 @@ pub(crate) struct Context<'a> {
     pub(crate) member: &'a Member,
     /// Identifier of the newest mission that this relay has stored. It can be newer than the active mission.
     pub(crate) latest: MissionId,
-    /// True if this relay has no neighbour on the side away from the leader, so that it is the last one.
+    /// True if this relay is the last one: it has no neighbour on the side away from the leader.
     pub(crate) end: bool,
     /// Remaining lease times of other relays. The positions of a new view must not be used before these leases have
     /// ended.
@@ -97,8 +97,8 @@ impl<'a> Context<'a> {
 
     /// Returns true if every relay itself computes the positions of the whole chain (joint method).
     ///
-    /// The settings must select the joint method. The mission must leave the lateral offset or the altitude free, or
-    /// have fitted slots. Fitted slots are time slots that are as long as each hop needs.
+    /// The settings must select the joint method. The relays must be free to choose a lateral offset or an altitude, or
+    /// the mission must have fitted slots. Fitted slots are time slots that are as long as each hop needs.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
@@ -136,7 +136,7 @@ impl<'a> Context<'a> {
         )
     }
 
-    /// Returns a path of `hops` hops whose relays forward messages at once, without computing first.
+    /// Returns a path of `hops` hops, along which relays forward messages at once, without computing first.
     pub(crate) const fn path(&self, hops: u16) -> Path {
         Path {
             hop_time: self.member.settings.hop_time,
@@ -165,13 +165,13 @@ impl<'a> Context<'a> {
 /// positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Upper bound of the remaining lease time of the other members of this view. It is known because every lease
-    /// renewal also passes through this relay.
+    /// Upper bound of the remaining lease time of the other members of this view. This relay knows it, because every
+    /// lease renewal passes through it.
     pub(crate) lease_left: Duration,
     /// View that this relay accepted last.
     pub(crate) view: ViewId,
-    /// Longest remaining lease time from a view before `view`. `None` if unknown, because a member has possibly not
-    /// accepted `view`.
+    /// Longest remaining lease time from a view before `view`. `None` if unknown: some member has possibly not accepted
+    /// `view` yet.
     pub(crate) earlier_lease_left: Option<Duration>,
 }
 
@@ -210,8 +210,8 @@ pub(crate) struct Effects {
     pub(crate) began: bool,
     /// True if the relays must agree on a new view (list of the chain's members).
     pub(crate) view_needed: bool,
-    /// Neighbour that has replied to a message, and the time at which that message was sent. The reply proves that the
-    /// neighbour was alive after that time. `None` without a reply.
+    /// Neighbour that has replied to a message of this relay, and the transmission time of this message. The neighbour
+    /// was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
     /// Origin of the view proposal received or made in this step; `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
@@ -243,9 +243,9 @@ pub(crate) enum LayerEvent {
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
-    /// The lease has expired, so a later view may already have other positions.
+    /// The lease has expired, so relays of a later view may already use other positions.
     Lapsed,
-    /// A hello to the neighbour toward the leader must request a new view.
+    /// The next hello to the neighbour toward the leader must request a new view.
     RequestView,
     /// A view proposal has been decided.
     ProposalDecided(ProposalOutcome),
@@ -271,7 +271,7 @@ pub(crate) enum ProposalOutcome {
     ///
     /// Its positions may be used after `usable_in` tenths of a second, when older leases have ended.
     Granted { relays: u16, usable_in: u16 },
-    /// Another view was decided earlier and is accepted instead. The leader then proposes a view that follows it.
+    /// An earlier decision on a different view is accepted instead. The leader then proposes a view that follows it.
     Superseded,
     /// Rejected: too few relays are reachable for a quorum.
     NoQuorum,
@@ -311,8 +311,7 @@ impl Effects {
         ..Self::NONE
     };
 
-    /// Effects of a message from a view to which this relay does not belong. The message is ignored, and a new view is
-    /// requested.
+    /// Effects of a message from a view other than this relay's. The message is ignored, and a new view is requested.
     pub(crate) const FOREIGN: Self = Self {
         view_needed: true,
         ..Self::STALE
@@ -344,8 +343,8 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the maximum time from the leader's first message along the chain until the result is back. It holds for a
-/// chain of `all` relays that loses half of its frames.
+/// Returns the maximum time from the leader's first message along the chain until its result returns. ¶ The chain has
+/// `all` relays, and loses half of its frames.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

@@ -53,17 +53,16 @@ use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 use crate::wire::session::{RAISED, Rival, Sender};
 
-/// Wait before the first claim that this relay sends without a request. The intervals between later claims double.
+/// Wait before the first claim that this relay sends unasked. The intervals between later claims double.
 ///
 /// Claims let two nodes with one node number detect each other.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time added before the first claim without a request, after a start or after the relay was passive. A hundred relays
-/// need about this time for their first agreement.
+/// Additional wait before the first unasked claim, after a start or after the relay was passive. A hundred relays need
+/// about this time for their first agreement.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum interval that results from doubling the interval between claims without a request. After it, a claim follows
-/// every `dead_after`.
+/// Maximum of the doubled intervals between unasked claims. Later claims follow every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
 /// Number of claims that this relay sends in answer to another node's claim. The interval between them is
@@ -82,7 +81,7 @@ fn least_interval(settings: &Settings) -> Duration {
 }
 
 /// Returns the interval between claims of a passive relay: a quarter of `probe_after`. A passive relay sends many
-/// claims before it becomes active again, so the loss of some does no harm.
+/// claims before it becomes active again, so the loss of a few claims does no harm.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
@@ -91,24 +90,24 @@ const fn passive_interval(settings: &Settings) -> Duration {
 #[derive(Clone, Debug)]
 pub(crate) struct IndexClaims {
     number: u32,
-    /// Largest claim number received from another node with this relay's node number and epoch. The node with the
-    /// smaller claim number becomes passive.
+    /// Largest claim number received from another node with this relay's node number and epoch. If it exceeds this
+    /// relay's own, this relay becomes passive.
     rival: u32,
     /// Last claim number received from another node with this relay's node number; 0 if there is none.
     last_rival: u32,
     /// Time of the last frame from another node with this relay's number. The flag is true if this relay already had a
-    /// position at the first such frame. `None` without such a frame.
+    /// position when the first such frame arrived. `None` without such a frame.
     contest: Option<(Instant, bool)>,
-    /// Times at which two nodes were last received with one number; `None` for never. Entry 0: this relay's number.
-    /// Entry 1: a neighbour's number.
+    /// Last times at which two nodes with the same number were detected; `None` if never. Entry 0 is for this relay's
+    /// number, entry 1 for a neighbour's.
     observed: [Option<Instant>; 2],
-    /// Time at which this relay last received one of its own frames; `None` if none has been received.
+    /// Time at which this relay last received an echo of its own frame; `None` if none has been received.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while this relay is active.
     passive_until: Option<Instant>,
-    /// Time of the next claim that is sent without a request; `None` if none is scheduled.
+    /// Time of the next unasked claim; `None` if none is scheduled.
     next_claim: Option<Instant>,
-    /// Interval between the next claim without a request and the claim after it.
+    /// Interval between the next unasked claim and the one after it.
     interval: Duration,
     /// Number of claims still to be sent to defend this relay's node number. The interval between them is
     /// [`least_interval`].
@@ -156,8 +155,8 @@ impl IndexClaims {
         self.number
     }
 
-    /// Records that two nodes use the same number. Returns true if this must be reported, because it was not observed
-    /// within the last two periods of `dead_after`.
+    /// Records that two nodes use the same number. Returns true if this must be reported: it was not observed in the
+    /// last 2 * `dead_after`.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -240,8 +239,8 @@ impl IndexClaims {
         false
     }
 
-    /// Compares another node's claim to this relay's number with this relay's claim. Returns true if this relay becomes
-    /// passive.
+    /// Compares the claim of another node to this relay's number with this relay's own claim. Returns true if this
+    /// relay becomes passive.
     fn compare(
         &mut self,
         now: Instant,
@@ -271,7 +270,7 @@ impl IndexClaims {
             self.sessions_due = true;
             self.defend(now, rival, settings);
             if settings.auth.is_some() {
-                // A replayed frame must not cause claims again.
+                // A replayed frame must not trigger claims again.
                 self.defences = REPEATED_CLAIMS;
                 self.schedule_unprompted(now, settings);
             }
@@ -292,8 +291,8 @@ impl IndexClaims {
         }
     }
 
-    /// Schedules claims in answer to another node's claim `rival` to this relay's number. They are repeated for some
-    /// seconds, or until the other node is passive. With signed frames only one claim is sent.
+    /// Schedules claims in answer to another node's claim `rival` to this relay's number. The claims are repeated for
+    /// some seconds, or until the other node is passive. With signed frames only one claim is sent.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {
@@ -415,7 +414,7 @@ mod tests {
         }
     }
 
-    /// Checks that a claim from before this relay's last start is answered and has no other effect.
+    /// Checks that a claim sent before this relay's last start is answered, and has no other effect.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
@@ -447,7 +446,7 @@ mod tests {
         }
     }
 
-    /// Checks which of two nodes with one number becomes passive, for all rows of the state table.
+    /// Checks which of two nodes with the same number becomes passive, for all rows of the state table.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();
@@ -485,8 +484,8 @@ mod tests {
         }
     }
 
-    /// Checks that a relay raises its claim number only if it had a position before it met its duplicate. After 40 s of
-    /// silence the next frame counts as the first one.
+    /// Checks that a relay raises its claim number only if it had a position before its duplicate appeared. After 40 s
+    /// of silence the next frame counts as the first one.
     #[test]
     fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();

@@ -1,4 +1,4 @@
-//! Lease: time during which a relay knows that no later view has positions.
+//! Lease: time during which a relay knows that no later view uses positions.
 //!
 //! A split chain agrees on new positions only in the part that has a quorum. Before that, the leases of all other
 //! members must have expired. So a relay with a lease knows that the positions of its own view are the only ones.
@@ -55,7 +55,7 @@ use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// No lease yet: nothing is agreed on in this view, or some members possibly do not know the agreement.
+    /// No lease yet: the view has no agreed positions, or some members possibly do not know them.
     Pending,
     Until(Instant),
     Lapsed,
@@ -73,9 +73,9 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Latest possible end of another member's lease that rests on this relay's part in a renewal.
+    /// Latest possible end of a lease of another member that this relay's part in renewals has extended.
     vouched_until: Instant,
-    /// Last accepted view, and the earliest time at which positions agreed on in it may be used.
+    /// Last accepted view, and the earliest time at which its agreed positions may be used.
     accepted: (ViewId, Instant),
     /// Latest time at which a lease from before the accepted view can end; `None` if unknown.
     older_leases_end: Option<Instant>,
@@ -91,8 +91,8 @@ pub(crate) struct Lease {
     circulation: Circulation,
     /// Orders of the leader in the last renewal of this view.
     orders: Orders,
-    /// Requests from this relay and the relays after it, as collected by the last completed renewal. `None` until a
-    /// renewal is completed.
+    /// Requests of this relay and of all relays farther from the leader, from the last completed renewal. `None` until
+    /// a renewal is completed.
     requests: Option<Requests>,
     /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
     departures: [Departures; DEPARTURES as usize],
@@ -102,9 +102,9 @@ pub(crate) struct Lease {
 #[derive(Clone, Copy, Debug)]
 struct Departures {
     requests: Requests,
-    /// Number of relays in the view when no relay requested to leave.
+    /// Number of relays in the view before a relay first requested to leave.
     complement: u16,
-    /// Relay that requests to leave (0 for none), and the time of its first request. It may be a request in an earlier
+    /// Relay that requests to leave (0 for none), and the time of its first request. The request may be from an earlier
     /// view.
     leaver: (u16, Instant),
     /// Time of the agreement on positions in this view, as seen by the leader.
@@ -116,8 +116,8 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// Creates the lease state of a relay that starts at `now`. After a restart, other relays can still have a lease
-    /// for up to `dead_after`, which this relay does not remember.
+    /// Creates the lease state of a relay that starts at `now`. After a restart of this relay, other relays can still
+    /// have leases for up to `dead_after`.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Pending,
@@ -141,7 +141,7 @@ impl Lease {
         }
     }
 
-    /// Sets this relay's requests to the leader: to leave, its spare, and if it is in place.
+    /// Sets this relay's requests to the leader: to leave, its spare, and the report that it is in place.
     pub(crate) fn set_requests(&mut self, requests: Requests) {
         if let Some(departures) = self.departures.first_mut() {
             departures.requests = requests;
@@ -152,7 +152,7 @@ impl Lease {
         self.orders
     }
 
-    /// Returns true if all relays of the view are known to have received the leader's last orders.
+    /// Returns true if all relays of the view have provably received the leader's last orders.
     pub(crate) fn has_completed(&self) -> bool {
         self.current.is_some() && !self.circulation.is_outstanding()
     }
@@ -160,8 +160,8 @@ impl Lease {
     /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
     /// A relay is ordered to leave once two consecutive renewals reported all relays in place. By then the relay that
-    /// left before it has received this report. If there is a spare, the spare joins first. No spare is called if the
-    /// view already has more relays than before the request.
+    /// left last knows that all relays are in place. If there is a spare, the spare joins first. No spare is called if
+    /// the view already has more relays than before the request.
     ///
     /// A relay that does not arrive counts as in place after half of the maximum duration of a lease. No relay waits
     /// for the order longer than this maximum duration, or than its remaining endurance. So at least half of the
@@ -186,7 +186,7 @@ impl Lease {
         let waited = now.since(known.leaver.1);
         let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
         let late = waited >= most || waited >= left;
-        // A spare that was called is silent while it joins.
+        // A spare is silent between the order to join and its arrival.
         let spare = if requests.spare == 0 {
             self.orders.joiner
         } else {
@@ -226,7 +226,7 @@ impl Lease {
 
     /// Returns the silence after which a neighbour may count as lost.
     ///
-    /// It is the lease duration of the last renewal, but at least `dead_after`.
+    /// It is the lease duration of the last renewal or `dead_after`, whichever is longer.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let span = self.current.map_or(0, |current| current.span);
         from_tenths(span).max(settings.dead_after)
@@ -247,7 +247,7 @@ impl Lease {
     /// that lease ends by `vouched_until`, because no renewal completes without all members.
     ///
     /// The age of an outstanding renewal counts as a round trip only if this relay was a member of `base` and `lost` is
-    /// false. If a relay is lost (`lost` is true), the age measures the outage.
+    /// false. If a relay is lost (`lost` is true), the age is that of the outage.
     pub(crate) fn accept_view(
         &mut self,
         now: Instant,
@@ -278,8 +278,8 @@ impl Lease {
         self.requests = None;
     }
 
-    /// Records that all members have accepted this relay's view. Leases of earlier views then end before the view's
-    /// positions may be used.
+    /// Records that all members have accepted this relay's view. Leases of earlier views end before the positions of
+    /// this view may be used.
     pub(crate) fn confirm_view(&mut self) {
         self.older_leases_end = Some(self.accepted.1);
         // The initial view is configured and needs no acceptance.
@@ -291,8 +291,8 @@ impl Lease {
         self.is_whole
     }
 
-    /// Records that this relay has agreed on its position. At the leader (`leads` is true) all members have then
-    /// agreed, so the first lease renewal is scheduled.
+    /// Records that this relay has agreed on its position. The leader (`leads` is true) agrees last, and schedules the
+    /// first lease renewal.
     pub(crate) fn on_agreement(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
@@ -369,8 +369,8 @@ impl Lease {
     }
 
     /// Completes the current lease renewal, and schedules the reply to the previous relay. The leader instead extends
-    /// its own lease and schedules the next renewal. `received` contains the requests of the relays after this relay;
-    /// `None` at the last relay.
+    /// its own lease and schedules the next renewal. `received` contains the requests of all relays farther from the
+    /// leader; `None` at the last relay.
     fn complete_renewal(&mut self, context: &Context<'_>, received: Option<Requests>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
@@ -398,13 +398,13 @@ impl Lease {
         if !context.leads() {
             return;
         }
-        // The period counts from the start of a renewal. So after a slow renewal the next one is due at once, apart
-        // from a pause for other traffic.
+        // The period counts from the start of a renewal. So after a slow renewal the next one follows after only a
+        // short pause for other messages.
         let period = self.period(context.settings());
-        // The second renewal follows at once, because no other member has a lease before it.
+        // The second renewal follows at once, because no other member gets a lease before it.
         let first = self.state == LeaseState::Pending;
         let took = context.now.since(forwarded_at);
-        // The maximum decays by 1/32 per renewal, so a run of lost frames counts for a minute or two.
+        // The maximum decays by 1/32 per renewal, so a long run of lost frames affects it for a minute or two.
         let part = self.round_trip.as_micros() / 32;
         let lately = self.round_trip.as_micros().saturating_sub(part);
         self.round_trip = took.max(Duration::from_micros(lately));
@@ -520,8 +520,8 @@ mod tests {
     use crate::view::ViewId;
 
     /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
-    /// change the leader is in view 1, and a lease renewal has been outstanding for 40 s. The new view is number `base`
-    /// + 1. It follows view `base`, and no relay is lost.
+    /// change the leader is in view 1, and its lease renewal has been outstanding for 40 s. The new view, number `base`
+    /// + 1, replaces view `base`, and no relay is lost.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

@@ -41,7 +41,7 @@ use crate::wire::upload::{Upload, UploadError, check_line};
 
 /// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0: no nonce.
 ///
-/// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
+/// A mission offer to this relay must repeat the nonce. So an old recording of an offer is recognised.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -58,7 +58,7 @@ struct Offering {
     heard: Option<Instant>,
     /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
-    /// Time at which the offer is repeated; `None` if it is not repeated.
+    /// Time at which the offer is sent again; `None` if it is not.
     at: Option<Instant>,
     /// Number of offers sent since the mission or the neighbour last changed.
     tries: u8,
@@ -85,7 +85,7 @@ impl Offering {
 pub(crate) enum Offered {
     /// The offered mission is newer than the stored one, and has been stored.
     Stored,
-    /// The mission is rejected: it does not fit the Tx and Rx positions, the geofence or the settings.
+    /// The mission is rejected: it contradicts the Tx and Rx positions, the geofence or the settings.
     ///
     /// `is_new` is true at the first rejection of this mission.
     Refused { why: LineError, is_new: bool },
@@ -118,7 +118,7 @@ struct Uploads {
     sites: Option<Sites>,
     /// Distance from Tx to Rx in the mission loaded before flight, m.
     loaded_m: f32,
-    /// Range of altitudes in the mission loaded before flight, m. It includes the common altitude.
+    /// Range of altitudes in the mission loaded before flight, m. The relays' common altitude is within the range.
     loaded_band: Band,
     /// Last mission that this relay or another relay has refused; `None` if there is none.
     refused: Option<MissionId>,
@@ -242,8 +242,8 @@ impl MissionUpdate {
     /// Returns the pending mission offer to the neighbour `to` at `side`, and marks it as sent.
     ///
     /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The returned number is the
-    /// nonce of the neighbour's hello, which the offer repeats. It is `None` if the hello is older than half of
-    /// `dead_after`: the caller must then request a new hello first.
+    /// nonce of the neighbour's hello, which the offer repeats. The number is `None` if the hello is older than half of
+    /// `dead_after`. Then the caller must first request a new hello.
     pub(crate) fn poll_offer(
         &mut self,
         (side, to): (Side, u16),
@@ -285,7 +285,7 @@ impl MissionUpdate {
 
     /// Schedules replies to the ground station at `side`.
     ///
-    /// A hello is scheduled if `reports` is true, and the stored upload if `asks` is the number of a request.
+    /// A hello is scheduled if `reports` is true, and the stored upload if `asks` has the number of a request for it.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -299,22 +299,22 @@ impl MissionUpdate {
         offering.is_some_and(|offering| core::mem::take(&mut offering.reports))
     }
 
-    /// Returns the upload that the ground station at `side` has requested, and the number of the request. `None` if
-    /// nothing is requested, or there is no upload.
+    /// Returns the upload that the ground station at `side` has requested, and the number of the request. `None`
+    /// without a request, or without a stored upload.
     pub(crate) fn poll_requested(&mut self, side: Side) -> Option<(Upload, u16)> {
         let answer = core::mem::take(&mut self.offering(side)?.ground_asks);
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
-    /// Returns the last refused mission. `None` without a refusal, if it is the mission `active`, or if the stored
-    /// mission is newer.
+    /// Returns the last refused mission. `None` if no mission was refused, if the refused mission is `active`, or if
+    /// the stored mission is newer.
     pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
-    /// Records a neighbour's report that the mission `refused` is refused. Returns true if it is the stored mission and
-    /// the refusal is new.
+    /// Records a neighbour's report that the mission `refused` is refused. Returns true if this relay has stored that
+    /// mission and did not know of the refusal.
     pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
@@ -367,8 +367,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Restores the stored mission `upload` after a start, and returns it. Returns an error if `untouched` is false:
-    /// the relay has then already taken part in the chain.
+    /// Restores the stored mission `upload` after a start, and returns it. Returns an error if the relay has already
+    /// taken part in the chain (`untouched` is false).
     pub(crate) fn resume(
         &mut self,
         member: &Member,
@@ -420,7 +420,7 @@ impl MissionUpdate {
             .encloses(member, config, upload.sites().is_some())
             .map_err(UploadError::Line)?;
         match upload.sites() {
-            // Relays without Tx and Rx coordinates check this too, so that all relays store the mission or none does.
+            // Relays without Tx and Rx coordinates check this too. So either all relays store the mission or none does.
             Some(sites) => check_line(sites, config.distance_m).map_err(UploadError::Line),
             None if member.settings.sited && is_other => {
                 Err(UploadError::Line(LineError::Distance))
@@ -437,13 +437,13 @@ impl MissionUpdate {
         self.uploads()?.sites
     }
 
-    /// Returns a digest of the Tx and Rx positions. Relays compare it to check that they use the same x axis.
+    /// Returns a digest of the Tx and Rx positions. Equal digests show that two relays use the same x axis.
     pub(crate) fn line_digest(&self, member: &Member) -> u16 {
         between(member.digest, self.sites())
     }
 
-    /// Makes the stored mission's Tx and Rx positions the ones in use. Returns true if they have changed, which makes
-    /// all relay positions invalid.
+    /// Uses the stored mission's Tx and Rx positions from now on. Returns true if they differ from those used before.
+    /// Then all relay positions are invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
@@ -452,8 +452,8 @@ impl MissionUpdate {
 
     /// Returns the geofence for the active mission; `None` without a guard.
     ///
-    /// If the mission's distance from Tx to Rx differs from that of the loaded mission, the maximum x changes by the
-    /// difference.
+    /// If the mission's distance from Tx to Rx differs from that of the loaded mission, the maximum x of the geofence
+    /// changes by the difference.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {
@@ -467,9 +467,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the exceeded limit.
     ///
-    /// The length of a mission with its own Tx and Rx positions (`sited`) is not limited. If the fixed altitude of a
-    /// relay is a limit of its geofence, the altitude limit of the loaded mission counts instead. All relays must
-    /// decide alike.
+    /// The length of a mission with its own Tx and Rx positions (`sited`) is not limited. Where this relay's fixed
+    /// altitude limits the geofence, the altitude limit of the loaded mission counts instead, so that all relays decide
+    /// alike.
     fn encloses(
         &self,
         member: &Member,
@@ -508,7 +508,7 @@ impl Uploads {
     }
 }
 
-/// Returns the range of altitudes of a mission, m, extended to the relays' common altitude.
+/// Returns a mission's range of altitudes, m, extended so that it includes the relays' common altitude.
 fn altitudes_of(config: &MissionConfig) -> Band {
     let common_m = config.common.altitude_m;
     Band {

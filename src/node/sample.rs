@@ -52,7 +52,8 @@ pub enum Sample {
         power_w: f32,
     },
     /// Mean interference power measured at Rx, on the ground. The firmware passes it to the last relay of the view. It
-    /// can also pass it to the three relays before the last relay. They use the value once they are the last relay.
+    /// can also pass it to each of the three relays before the last one. Such a relay uses the value once it is the
+    /// last relay itself.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
@@ -94,8 +95,8 @@ impl Meter {
         }
     }
 
-    /// Adds a sample. Returns true if it was accepted. `at` is relay 1's setpoint, needed to convert the SIR of the
-    /// first hop to interference; `None` at other relays.
+    /// Adds a sample. Returns true if it was accepted. `at` is the setpoint of relay 1, from which the SIR of the first
+    /// hop gives the interference; `None` at other relays.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,
@@ -118,7 +119,7 @@ impl Meter {
         let used = estimator.accepted() > before;
         if used && estimator.accepted() == *wanted {
             let upsilon = estimator.estimate().map(|estimate| estimate.upsilon_per_w);
-            // Without a valid estimate the agreed interference is used, because the last estimate is for another
+            // Without a valid estimate the agreed interference is used, because the last estimate belongs to an earlier
             // position.
             self.published = upsilon.filter(|upsilon| is_upsilon(*upsilon));
         }
@@ -158,9 +159,9 @@ pub(super) struct SensorState {
     pub(super) transmitter: Average,
     /// Average of the interference power measured at Rx on the ground.
     pub(super) receiver: Average,
-    /// True while this relay withholds its measurements because they contradict those of the other nodes.
+    /// True while this relay withholds its measurements because they contradict those of all other nodes.
     pub(super) off: bool,
-    /// Node whose measurements were left out of the last collection of measurements; 0 for none.
+    /// Node whose measurements the last collection left out; 0 for none.
     pub(super) left_out: u16,
     /// Node whose sensor counts as faulty, as found by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
@@ -178,7 +179,7 @@ pub(super) struct SensorState {
     pub(super) silent_at: Placement,
     /// True once the view's relays have received the current estimate. Known at the leader only.
     pub(super) is_distributed: bool,
-    /// Number and expected error of the measurements behind the current estimate.
+    /// Number and expected error of the measurements from which the current estimate was computed.
     pub(super) known: Knowledge,
     /// Reason why the last collected measurements gave no estimate; `None` if they gave an estimate.
     pub(super) unfit: Option<Unfit>,
@@ -250,7 +251,7 @@ impl Sensing {
         if let Some(sensor) = self.sensor_mut() {
             sensor.estimate.estimate = InterferenceEstimate::Mission;
             sensor.estimate.number = sensor.estimate.number.wrapping_add(1);
-            // The ground stations of the new mission may be at other places.
+            // The ground stations of the new mission may be at different places.
             sensor.transmitter = Average::NONE;
             sensor.receiver = Average::NONE;
             sensor.known = Knowledge::NOTHING;
@@ -361,10 +362,10 @@ impl SensorState {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums of the measurements of all earlier relays, as received from the previous relay.
+    /// Sums over the measurements of all relays before this one, as received from the previous relay.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the positions were agreed on with the current estimate, so that no new agreement is needed.
+    /// True if the current estimate was already known at the agreement on positions. No new agreement is then needed.
     pub(super) holds: bool,
 }
 
@@ -373,7 +374,7 @@ pub(super) struct Sense {
 pub(super) struct Findings {
     pub(super) estimate: NumberedEstimate,
     pub(super) unfit: Option<Unfit>,
-    /// Node with a faulty sensor, according to the last collected measurements; 0 for none.
+    /// Number of the node with a faulty sensor, according to the last collection; 0 for none.
     pub(super) off: u16,
     pub(super) ends: EndsOff,
     pub(super) deaf: bool,

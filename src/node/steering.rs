@@ -1,6 +1,6 @@
 //! Setpoint on the way to the position that the chain has agreed on.
 //!
-//! It is limited by the [guard](crate::guard), if there is one.
+//! The setpoint is limited by the [guard](crate::guard), if there is one.
 
 use super::context::{earliest, tenths};
 use crate::features::{DEPARTURES, GUARD};
@@ -11,7 +11,7 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Time after which fence messages to the neighbours are repeated, because a message can be lost.
+/// Interval at which fence messages to the neighbours are repeated, because a message can be lost.
 ///
 /// A fence is the plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
@@ -44,8 +44,7 @@ struct Motion {
 /// It takes the same time at all relays of a chain, so that they arrive together.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position at the last call of `advance`. `wanted` is the position to fly to now, and approaches it in
-    /// steps.
+    /// Agreed position at the last call of `advance`. `wanted`, the position to fly to now, approaches it in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
     /// Motion to the agreed position; `None` once it has ended.
@@ -60,7 +59,7 @@ impl Way {
     };
 
     /// Returns the position to fly to at `now`; `None` without an agreed position. If `agreed` has changed, the
-    /// position to fly to moves there in 32 steps within the time `span`.
+    /// position to fly to approaches it in 32 steps within the time `span`.
     fn advance(
         &mut self,
         now: Instant,
@@ -72,7 +71,8 @@ impl Way {
             return self.wanted;
         }
         self.agreed = agreed;
-        // A changed motion ends at the time planned for the old one, so that frequent agreements do not delay the end.
+        // A new motion during another ends when the other would have ended, so that frequent agreements do not delay
+        // the end.
         let left = self.motion.map(|it| (it.since + it.span).since(now));
         let span = left.map_or(span, |left| left.min(span));
         self.motion = self
@@ -186,7 +186,7 @@ impl Steering {
         matches!(&self.way[..], [way] if way.motion.is_some())
     }
 
-    /// Returns the position to fly to if the motion stops now; `None` until the chain has agreed.
+    /// Returns the position at which the motion would stop now; `None` until the chain has agreed.
     pub(crate) fn stopped(&self) -> Option<Placement> {
         self.way.first()?.wanted
     }
@@ -257,7 +257,7 @@ impl Steering {
 
     /// Removes the limits that lost relays at `side` put on the setpoint.
     ///
-    /// These relays are no longer in the air. `others` is true if the view has further relays at this side. Until the
+    /// These relays are no longer in the air. `others` is true if the view still has relays at this side. Until the
     /// guard has received a message of one of them, it does not move the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
@@ -297,7 +297,7 @@ mod tests {
         Instant::ZERO + Duration::from_millis(ms)
     }
 
-    /// Checks that the motion ends in time even if new agreements arrive before its end.
+    /// Checks that a motion ends on time even if new agreements arrive during it.
     #[test]
     fn frequent_agreements_do_not_put_off_the_arrival() {
         let span = Duration::from_millis(20_000);

@@ -1,4 +1,4 @@
-//! Facade of a relay: bytes and time in, frames and events out. Also the records kept across a reboot.
+//! Facade of a relay: bytes and time in, frames and events out. Also the records that survive a reboot.
 
 use super::{Port, Transmit};
 use crate::event::Event;
@@ -87,8 +87,8 @@ use crate::wire::upload::{Upload, UploadError};
 pub struct Relay {
     pub(super) node: Node,
     pub(super) endpoint: Endpoint,
-    /// Decoders of received frames. The first is for the upstream port or the shared channel, the second for the
-    /// downstream port.
+    /// Decoders of received frames. Entry 0 is for the upstream port or the shared channel, entry 1 for the downstream
+    /// port.
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
     /// Endurance of the drone. Empty without the feature `departures`.
@@ -102,9 +102,10 @@ impl Relay {
     /// an interference field.
     ///
     /// `seed` must differ between boards, even if their image and configuration are the same, and should differ between
-    /// starts. Use a chip's unique number, a random number generator, or the noise of RAM after power-up. By the seed
-    /// two relays with the same index distinguish each other, so that at most one has a setpoint. The seed also affects
-    /// retransmission timing, message numbers and the messages that a guard considers old, but no position.
+    /// starts. Use a chip's unique number, a random number generator, or the noise of RAM after power-up. Two relays
+    /// with the same index distinguish each other by their seeds, so that at most one of them has a setpoint. The seed
+    /// also affects retransmission timing, message numbers and the messages that a guard considers old, but no
+    /// position.
     ///
     /// # Errors
     /// Returns a [`SetupError`] that names the invalid part of `identity` or `settings`.
@@ -337,8 +338,8 @@ impl Relay {
     /// Returns the votes on views if they have changed and must be stored; otherwise `None`.
     ///
     /// [`poll_transmit`](Self::poll_transmit) returns no frame until the firmware has confirmed by
-    /// [`persisted`](Self::persisted) that they are stored. A relay that forgot its votes in a restart could vote
-    /// twice, and the chain could split. Takes constant time.
+    /// [`persisted`](Self::persisted) that they are stored. A relay without its votes after a restart could vote twice,
+    /// and the chain could split. Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -387,7 +388,7 @@ impl Relay {
     /// Call it right after the relay was created; only `Relay::resume` is allowed before. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission. Returns
+    /// Returns [`RecordError::Base`] if the record is of a relay that had loaded a different mission. Returns
     /// [`RecordError::Begun`] if the relay has already sent, received or computed something. The relay is then
     /// unchanged.
     pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
@@ -404,9 +405,9 @@ impl Relay {
     /// was loaded before flight. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Base`] if the upload replaces another loaded mission. Returns [`UploadError::Line`] if it
-    /// does not fit the positions of Tx and Rx or the geofence. Returns [`UploadError::Begun`] if the relay has already
-    /// started. The relay is then unchanged.
+    /// Returns [`UploadError::Base`] if the upload is for relays that loaded a different mission. Returns
+    /// [`UploadError::Line`] if it contradicts the positions of Tx and Rx or the geofence. Returns
+    /// [`UploadError::Begun`] if the relay has already started. The relay is then unchanged.
     pub fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         self.node.resume(upload)
     }
@@ -415,9 +416,9 @@ impl Relay {
     /// adopts it like any other upload. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, and [`UploadError::Base`] if the upload replaces
-    /// another loaded mission. Returns [`UploadError::Line`] if it does not fit the positions of Tx and Rx or the
-    /// geofence. Returns [`UploadError::Old`] if the relay has already stored this mission or a newer one.
+    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, and [`UploadError::Base`] if the upload is for
+    /// relays that loaded a different mission. Returns [`UploadError::Line`] if it contradicts the positions of Tx and
+    /// Rx or the geofence. Returns [`UploadError::Old`] if the relay has already stored this mission or a newer one.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(self.clock.advance(now), upload)
     }
@@ -458,18 +459,10 @@ impl Relay {
         self.node.agreed_place()
     }
 
-    /// Returns false if the drone and a neighbour that flies to setpoints are in the wrong order along x.
+    /// Returns false if the drone and a neighbour are in the wrong order along x.
     ///
-    /// The pilot must then first fly the drone to the right side of that neighbour. `Autopilot::exchange` passes this
-    /// value to the autopilot link.
-    ///
-    /// ```
-    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-    /// # use paper::*;
-    /// use uav_relay::Settings;
-    ///
-    /// assert!(relay(Settings::default()).is_ready());
-    /// ```
+    /// Only a neighbour that flies to setpoints counts. The pilot must first fly the drone past that neighbour, in the
+    /// direction of x. `Autopilot::exchange` passes this value to the autopilot link.
     pub fn is_ready(&self) -> bool {
         let wrong = |side| self.hold_reason(side) == Some(HoldReason::Order);
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
@@ -477,8 +470,8 @@ impl Relay {
 
     /// Returns the reason why the guard holds the drone back on `side`; otherwise `None`.
     ///
-    /// The guard is the collision avoidance. While the drone does not fly to setpoints, only [`HoldReason::Order`] is
-    /// possible. `None` also without a guard.
+    /// `None` as well without a guard (collision avoidance). While the drone does not fly to setpoints, only
+    /// [`HoldReason::Order`] is possible.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
     }
@@ -491,8 +484,8 @@ impl Relay {
         Bearing::between(self.setpoint()?, self.node.place_toward(side)?)
     }
 
-    /// Returns the target SIR that every hop of the agreed chain meets, linear. `None` before an agreement, and without
-    /// known interference.
+    /// Returns the target SIR that every hop of the agreed chain meets, linear. `None` before an agreement, and while
+    /// the interference is unknown.
     pub fn target(&self) -> Option<f32> {
         let known = !matches!(self.mission().interference(), Interference::Unknown);
         self.node.round().target().filter(|_| known)
@@ -532,7 +525,7 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive, because another node with its number has precedence.
+    /// Returns true while this relay is passive, because a second node with its number has precedence.
     ///
     /// Each node draws a random claim number at its start. Of two nodes with one node number, the larger epoch has
     /// precedence, then the larger claim number. A passive relay has no setpoint and takes no part in the protocol. It
@@ -739,9 +732,9 @@ impl Relay {
     /// Reports that relays on `side` that were lost or under a pilot's control are no longer in the air. See
     /// [`handle_control`](Self::handle_control).
     ///
-    /// The guard (collision avoidance) no longer keeps clear of these relays. If the view has other relays on that
-    /// side, the drone does not move toward them yet. The guard first has to receive the nearest of them. If that relay
-    /// is lost before, call the function again. Takes constant time.
+    /// The guard (collision avoidance) no longer keeps clear of these relays. If the view still has relays on that
+    /// side, the drone does not move toward them before the guard has received the nearest of them. If that relay is
+    /// lost before, call the function again. Takes constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }
@@ -750,8 +743,8 @@ impl Relay {
     /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
     /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above that of the
-    /// other node. Of two nodes with one number, only the node with the larger claim number may have a setpoint. Takes
-    /// constant time.
+    /// other node. Of two nodes with the same number, only the one with the larger claim number may have a setpoint.
+    /// Takes constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }
@@ -785,8 +778,8 @@ impl Relay {
     /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
     ///
     /// Call it right after the start: it has no effect once the relay has taken part in an agreement or a view change.
-    /// The first leader cannot be a spare, nor can a relay with two wires. No guard knows where a waiting spare is. It
-    /// must wait at least the separation away from all positions of the chain. Takes constant time.
+    /// The first leader cannot be a spare, nor can a relay with two wires. No guard knows where a waiting spare is. So
+    /// its distance from all positions of the chain must be at least the separation. Takes constant time.
     pub fn wait_as_spare(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.wait_as_spare(now);
@@ -796,7 +789,7 @@ impl Relay {
     ///
     /// From now on the relay requests to leave only if the firmware calls [`leave`](Self::leave), or if the margin
     /// becomes too small. The margin is the remaining flight time minus the time of the way home (`handle_endurance`).
-    /// It is too small below the usual limit and below half of the margin at this call.
+    /// It is too small if it is below the usual limit, and also below half of the margin at this call.
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.override_endurance(now, true);

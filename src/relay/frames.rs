@@ -12,7 +12,7 @@ use crate::wire::session::{Checked, Rival, Sender, Session};
 
 /// Number of unanswered heartbeat requests to a neighbour after which a handshake requests a reply.
 ///
-/// The reply shows whether the neighbour takes another node with this relay's number for this relay.
+/// The reply shows if the neighbour communicates with a different node that has this relay's number.
 const QUESTIONS: u16 = 4;
 
 /// Handles an intact frame of this relay's network, received at `port`.
@@ -98,7 +98,7 @@ fn receive_signed(
     side: Side,
     frame: &Opened<'_>,
 ) {
-    // A passive relay waits until it receives the other node itself. Neighbours also show the nonce of a node that is
+    // A passive relay waits until it receives the other node itself. Neighbours also repeat the nonce of a node that is
     // gone.
     if let Some(rival) = rival
         && !node.is_passive()
@@ -117,7 +117,7 @@ fn receive_signed(
             node.on_authentic(now, side, sender, first);
         }
         Checked::Unproven => node.on_handshake(side, sender),
-        // While the two nodes do not know each other's nonces, the tag of any other frame is wrong, too.
+        // While the two nodes do not know each other's nonces, the tag of any frame other than a handshake is wrong.
         Checked::Forged if frame.handshake => node.on_forged(now, side, sender),
         Checked::WentBack => node.on_epoch_went_back(side, sender),
         Checked::Unsigned | Checked::Forged | Checked::Replayed => {}
@@ -170,7 +170,8 @@ pub(super) fn poll_transmit(
     if let Some(session) = endpoint.session_mut() {
         schedule_handshake(node, session, to, &message);
         if matches!(message, Message::Watch { .. } | Message::Report(_)) && !session.knows(to) {
-            // The neighbour knows this relay. If the handshake succeeds, the next report goes to the neighbour.
+            // The neighbour already knows this relay. If the handshake succeeds, the next report goes to that
+            // neighbour.
             session.greet(to);
             let [before, after] = node.neighbours();
             let near = match side {
@@ -183,7 +184,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules a handshake to node `to` if `message` to this node makes one necessary.
+/// Schedules a handshake to node `to` if the sending of `message` to this node requires one.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0
@@ -198,7 +199,7 @@ fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Mes
         && hello.requests_reply
         && !hello.is_heard(node.member().node, to)
     {
-        // The node may have restarted. Then it accepts only handshakes, and sends nothing without a request.
+        // The node may have restarted. Then it accepts only handshakes, and sends nothing unasked.
         session.request_reply_of_silent(to);
     }
 }

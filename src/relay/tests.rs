@@ -1,4 +1,4 @@
-//! Tests at the end of the frame counter's range, which sent frames would not reach in a test.
+//! Tests at the end of the frame counter's range, which a test cannot reach by sending frames.
 
 use super::Relay;
 use crate::mission::tests::paper;

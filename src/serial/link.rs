@@ -16,11 +16,11 @@ pub const READ_LIMIT: usize = 64;
 /// Capacity of the transmit queue, bytes: the frame that the port is sending, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
 
-/// Maximum pause before the next write to a port that accepts nothing, in byte times.
+/// Maximum pause between attempts to write to a port that accepts no bytes, in byte times.
 const LONGEST_PAUSE: u32 = 128;
 
 /// Placeholder type for a link without a driver-enable pin. Such a link is full duplex, or its radio switches between
-/// sending and receiving.
+/// sending and receiving by itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NoPin {}
 
@@ -48,26 +48,26 @@ pub(crate) const fn byte_time(baud: u32) -> Duration {
 
 /// Serial port of a relay with its transmit queue, and its driver-enable pin if it has one.
 ///
-/// The pin is high from before the first byte of a frame until the last bit of the last queued frame has left, and low
-/// otherwise. An [`Nb`](super::Nb) port reports when that bit has left. For an [`Io`](super::Io) port the time is
-/// computed from the byte time, conservatively: every byte counts from the poll after the one that wrote it.
+/// The pin is high from before the first byte of a frame until the last bit of the last queued frame has left the port,
+/// and low otherwise. An [`Nb`](super::Nb) port reports when that bit has left. For an [`Io`](super::Io) port the time
+/// is computed from the byte time, conservatively: every byte counts from the poll after the one that wrote it.
 #[derive(Debug)]
 pub struct SerialLink<P, D = NoPin> {
     port: P,
     pin: Option<D>,
-    /// Last level of the driver-enable pin; `None` before the first one and after an error.
+    /// Last level of the driver-enable pin; `None` before the pin is first set, and after an error.
     level: Option<bool>,
     byte_time: Duration,
     waiting: Deque<u8, QUEUE>,
     clock: MonotonicClock,
-    /// Time at which the port last accepted a byte, or at which a byte entered the empty queue.
+    /// Last time at which the port accepted a byte, or at which a byte entered the empty queue.
     moved_at: Instant,
     /// Number of bytes written by the last poll. Their transmission time counts from the next poll, because the exact
     /// time of writing is unknown.
     uncounted: u32,
     /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
-    /// True if the last poll stopped reading at its limit, so that the port can have more bytes.
+    /// True if the last poll stopped reading at its limit, so that the port may have more bytes.
     unread: bool,
     stats: SerialStats,
 }
@@ -83,7 +83,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
     /// Creates a half-duplex link over `port` at `baud` bit/s, with 10 bits per byte. The driver-enable pin is high
     /// while this relay sends.
     ///
-    /// The first poll sets the pin low, unless there is something to send.
+    /// The first poll sets the pin low, unless a frame is queued.
     pub fn half_duplex(port: P, baud: u32, pin: D) -> Self {
         Self::with_pin(port, baud, Some(pin))
     }
@@ -228,7 +228,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
         if !self.waiting.is_empty() && !self.raise() {
             return;
         }
-        // A port that is ready accepts at least one byte, so the loop ends.
+        // A port that reports it is ready accepts at least one byte, so the loop ends.
         while let (front @ [_, ..], _) = self.waiting.as_slices() {
             match self.port.write(front) {
                 Ok(0) => return,
@@ -250,7 +250,7 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
         if self.unread || (driving && self.waiting.is_empty()) {
             return Some(now + self.byte_time);
         }
-        // A port that accepts nothing is tried again after a pause as long as the time since it last accepted a byte.
+        // A port that accepts nothing is tried again after a pause that equals the time since it last accepted a byte.
         let longest = self.byte_time.times(LONGEST_PAUSE);
         let stuck = self.clock.internal(now).since(self.moved_at);
         let pause = stuck.min(longest).max(self.byte_time);
@@ -278,7 +278,7 @@ pub struct SerialStats {
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each attempt is repeated.
     pub pin: u32,
-    /// Number of frames dropped because the transmit queue was full, as the port accepts nothing. The relay sends
+    /// Number of frames dropped because the transmit queue was full, because the port accepts no bytes. The relay sends
     /// important frames again.
     pub dropped: u32,
     /// Number of frames for a port that this driver does not have. The relay's [`Wiring`](crate::Wiring) then does not

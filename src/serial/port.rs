@@ -9,13 +9,13 @@ use embedded_hal_nb::serial::{Error as _, ErrorKind};
 pub enum Fault {
     /// A byte was received before the previous byte was read.
     Overrun,
-    /// The byte had no stop bit: another baud rate, a break, a loose wire.
+    /// The byte had no stop bit: wrong baud rate, break condition, or loose wire.
     Framing,
     /// The serial port received a byte with the wrong parity bit.
     Parity,
     /// The serial port sampled a byte on a noisy line.
     Noise,
-    /// The serial port reported a receive error of another or an unknown kind.
+    /// The serial port reported a receive error of any other kind, or of an unknown kind.
     Other,
 }
 
@@ -40,7 +40,7 @@ pub trait SerialPort {
     /// Takes bytes to send from the front of `bytes` (never empty), and returns their number. 0 if the port is full.
     ///
     /// # Errors
-    /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.
+    /// [`Fault`] if no byte was accepted, for a reason other than lack of room; the same bytes are offered again.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault>;
 
     /// Returns true if the last bit of all accepted bytes has left the port; `None` if unknown.
@@ -86,7 +86,7 @@ where
     }
 }
 
-/// Converts the result of an `nb` call. `None` means `WouldBlock`: the call would have to wait.
+/// Converts the result of an `nb` call. `None` stands for `WouldBlock`: the call would have to wait.
 fn ready<S, T>(result: nb::Result<T, S::Error>) -> Result<Option<T>, Fault>
 where
     S: embedded_hal_nb::serial::ErrorType,
@@ -107,9 +107,9 @@ where
 /// Port with [`embedded_io`] traits.
 ///
 /// Its `read` and `write` may block, so each is called only after the port has reported that it will not block. Its
-/// `flush` may block and is never called. So the port cannot report when the last byte has left, and a driver-enable
-/// pin uses the byte time instead. For this the port must send at once and without gaps. A UART with a FIFO or a ring
-/// buffer does so; a USB adapter does not.
+/// `flush` may block and is never called. So the port cannot report when the last byte has left, and the time for a
+/// driver-enable pin is computed from the byte time. For this the port must send at once and without gaps, as a UART
+/// with a FIFO or a ring buffer does, but not a USB adapter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Io<S>(pub S);
 

@@ -88,7 +88,7 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
-/// Trigger of a UART's interrupt, which then starts to send: a closure, or a type of the firmware.
+/// Trigger of a UART's interrupt, which starts to send: a closure, or a type of the firmware.
 pub trait Pend {
     /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);
@@ -158,7 +158,7 @@ pub struct InterruptEnd<'q> {
     received: Producer<'q, AtomicU16>,
     outgoing: Consumer<'q, AtomicU8>,
     lost: &'q AtomicU32,
-    /// True from the loss of bytes until a [`Fault::Overrun`] is queued in their place.
+    /// True from the loss of received bytes until a [`Fault::Overrun`] is queued in their place.
     gap: bool,
 }
 
@@ -173,8 +173,8 @@ impl fmt::Debug for InterruptEnd<'_> {
 impl InterruptEnd<'_> {
     /// Queues a received byte or a fault of the UART for the main loop.
     ///
-    /// If the queue is full, the byte is lost and counted, and the main loop reads one [`Fault::Overrun`] in its
-    /// place.
+    /// If the queue is full, the byte is lost and counted, and the main loop reads one [`Fault::Overrun`] in place of
+    /// consecutive lost bytes.
     pub fn received(&mut self, item: Result<u8, Fault>) {
         if self.gap && self.received.put(encode(Err(Fault::Overrun))) {
             self.gap = false;
@@ -224,8 +224,8 @@ impl<K> QueuedPort<'_, K> {
         self.outgoing.room()
     }
 
-    /// Returns the number of received bytes lost because the queue was full. The main loop has not read it often
-    /// enough.
+    /// Returns the number of received bytes lost because the queue was full. The main loop then reads the queue too
+    /// seldom.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
@@ -238,7 +238,7 @@ impl<K: Pend> SerialPort for QueuedPort<'_, K> {
         for place in into {
             match self.received.peek().map(decode) {
                 Some(Ok(byte)) => *place = byte,
-                // Bytes before a fault are returned first.
+                // Bytes received before a fault are returned before it.
                 Some(Err(fault)) if count == 0 => {
                     self.received.pop();
                     return Err(fault);
@@ -320,8 +320,8 @@ impl AtomicSlot for AtomicU16 {
     }
 }
 
-/// Indices of a ring buffer: first item, and cell after the last item. The ring is empty if they are equal, so one cell
-/// is never used.
+/// Indices of a ring buffer: first item, and cell after the last item. Equal indices mean an empty ring, so one cell
+/// always stays unused.
 #[derive(Debug)]
 pub(super) struct RingIndices {
     first: AtomicUsize,
@@ -436,7 +436,7 @@ mod tests {
         assert_eq!(port.lost(), 5);
         let mut bytes = [0; 3];
         assert_eq!((port.read(&mut bytes), bytes), (Ok(3), [0, 1, 2]));
-        // There is room for the overrun and the fault after it.
+        // The queue has room for the overrun fault and the item after it.
         interrupt.received(Ok(9));
         interrupt.received(Err(Fault::Noise));
         assert_eq!((port.read(&mut bytes), bytes[0]), (Ok(1), 3));

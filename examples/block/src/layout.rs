@@ -9,7 +9,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, Unaligned};
 
 use super::{ConfigError, FieldStorage, MAX_POINTS, Sites};
 
-/// Bytes of a configuration block as a structure. The fields are in the order of the table in `lib.rs`.
+/// Bytes of a configuration block as a structure. Its fields are in the order of the table in `lib.rs`.
 #[derive(FromBytes, IntoBytes, Immutable, Unaligned)]
 #[repr(C)]
 pub(super) struct Layout {
@@ -24,7 +24,7 @@ pub(super) struct Layout {
     pub(super) distance_m: F32,
     pub(super) min_separation_m: F32,
     pub(super) tx_power_w: F32,
-    /// Altitude (m) and transmit power (W) of a relay without its own values.
+    /// Altitude (m) and transmit power (W) of relays without own values.
     pub(super) common: [F32; 2],
     pub(super) own: [F32; 2],
     /// Interferer's power (W), x and y (m). All are 0 if the interferer is unknown, or if the block gives the
@@ -77,7 +77,7 @@ fn is_zero(numbers: &[F32]) -> bool {
 }
 
 impl Layout {
-    /// Returns the placement method. The parameters of the method `Adjust` must be 0 with any other method.
+    /// Returns the placement method. With methods other than `Adjust`, the parameters of `Adjust` must be 0.
     pub(super) fn method(&self) -> Result<Method, ConfigError> {
         let (explore_m, rounds) = (self.explore_m.get(), self.rounds.get());
         let unused = explore_m.to_bits() == 0 && rounds == 0;
@@ -105,7 +105,7 @@ impl Layout {
         }
     }
 
-    /// Returns the settings for estimating an unknown interferer; `None` if these settings are all 0.
+    /// Returns the settings for estimating an unknown interferer; `None` if all of these settings are 0.
     pub(super) fn listen(&self) -> Result<Option<Listen>, ConfigError> {
         let [every, half_life] = self.listen_us;
         let listen = Listen {
@@ -120,7 +120,8 @@ impl Layout {
         }
     }
 
-    /// Returns the Tx and Rx positions and the drone's speed limit. `None` if all are 0: there is no autopilot.
+    /// Returns the Tx and Rx positions and the drone's speed limit. `None` if all these numbers are 0, which means no
+    /// autopilot.
     pub(super) fn sites(&self) -> Result<Option<Sites>, ConfigError> {
         let ends = self.ends.map(|site| site.map(I32::get));
         let speed_m_s = self.speed_m_s.get();
@@ -137,8 +138,8 @@ impl Layout {
 
     /// Returns the interference in the block.
     ///
-    /// With points along x, these are copied to `storage` and used. Otherwise the interferer is used. If its numbers
-    /// are all 0 and `listens` is true, the interference is `Unknown`: the relays estimate it.
+    /// If the block has points along x, they are copied to `storage` and used. Otherwise the interferer is used. If all
+    /// its numbers are 0 and `listens` is true, the interference is `Unknown`: the relays estimate it.
     pub(super) fn interference(
         &self,
         listens: bool,

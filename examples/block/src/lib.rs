@@ -108,7 +108,7 @@ pub const MAX_POINTS: usize = 16;
 /// Number of bytes that the CRC covers: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
-/// Maximum of `probe_after_ms`, ms. A neighbour that is silent for this time is asked for a heartbeat.
+/// Maximum of `probe_after_ms`, ms. After a silence of `probe_after_ms`, a neighbour is asked for a heartbeat.
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
@@ -128,7 +128,7 @@ pub const EMPTY: FieldStorage = [FieldPoint {
 
 /// Reads and checks a configuration block. The interference points, if any, are copied to `storage`.
 ///
-/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions. It rejects the
+/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions. The relay rejects the
 /// joint method for more than 100 relays, and a feature that its build lacks.
 ///
 /// # Errors

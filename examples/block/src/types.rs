@@ -10,7 +10,7 @@ use uav_relay::{
 
 use super::BAUD;
 
-/// Default of `probe_after_ms`, ms. It applies if the block has 0.
+/// Default of `probe_after_ms`, ms. It applies if the block has the value 0.
 const DEFAULT_PROBE_AFTER_MS: u64 = 5_000;
 
 /// Settings of one relay, decoded from its configuration block and checked.
@@ -22,7 +22,7 @@ pub struct Config {
     pub mission: Mission,
     /// Altitude and transmit power of this relay.
     pub profile: Profile,
-    /// True if the relay keeps its configured altitude although the method chooses altitudes.
+    /// True if the relay keeps its configured altitude with a method that chooses altitudes.
     pub hold_altitude: bool,
     /// Placement method.
     pub method: Method,
@@ -50,7 +50,7 @@ impl Config {
             ms => ms.into(),
         };
         Settings {
-            // An upload may change a profile that equals the common one.
+            // An upload may change the profile of a relay that has the mission's common profile.
             profile: Some(self.profile).filter(|own| self.hold_altitude || *own != common),
             hold_altitude: self.hold_altitude,
             method: self.method,
@@ -113,7 +113,8 @@ pub struct ChannelNumbers {
 }
 
 impl ChannelNumbers {
-    /// Returns the channel. A weight of exactly 1 or 0 gives bit-identical [`AirGround::Los`] or [`AirGround::Nlos`].
+    /// Returns the channel. A weight of exactly 1 gives [`AirGround::Los`], a weight of exactly 0 [`AirGround::Nlos`],
+    /// both bit-identical.
     ///
     /// # Errors
     /// [`ChannelError`] names the number that is out of range.
@@ -144,29 +145,29 @@ pub enum ConfigError {
     Profile,
     /// The altitude flag is neither 0 nor 1.
     Hold,
-    /// The placement method is unknown, or not `align` with interference points.
+    /// The placement method is unknown, or it is not `align` although the block has interference points.
     Method,
-    /// The parameters of the method adjust are out of range, or not 0 with another method.
+    /// The parameters of the method adjust are out of range, or not 0 although the method is not adjust.
     Adjust,
-    /// The measurement settings are out of range, or have a maximum power without a number of samples.
+    /// The measurement settings are out of range, or they have a maximum power but no number of samples.
     Measure,
     /// The settings for estimating an interferer are out of range, or combined with interference points.
     Listen,
-    /// The joint method, an unknown interferer and traffic in both directions cannot be combined.
+    /// The block combines the joint method, an unknown interferer, and traffic both from Tx to Rx and back.
     Reverse,
     /// Fitted slots (as long as each hop needs) require the joint method and a known interferer.
     Fitted,
     /// The block has both an interferer and interference points.
     Interferer,
-    /// The block has more interference points than fit.
+    /// The block's number of interference points exceeds [`MAX_POINTS`](super::MAX_POINTS).
     Points,
     /// Bytes after the last interference point are not 0.
     Unused,
     /// The block has a signing key without an epoch, an epoch without a key, or the epoch 4294967295.
     Secret,
-    /// The maximum speed is out of range, or given without the positions of transmitter and receiver.
+    /// The maximum speed is out of range, or the positions of transmitter and receiver are missing.
     Speed,
-    /// The block has an autopilot key, but no Tx and Rx positions, so no autopilot.
+    /// The block has an autopilot key, but no Tx and Rx positions, without which there is no autopilot.
     AutopilotKey,
     /// `probe_after_ms` exceeds its maximum.
     Silence,

@@ -10,8 +10,8 @@ use super::{Block, CHECKED, ChannelNumbers, Config, LEN_FIELD, MAGIC, Secret, VE
 /// Returns the configuration block of `config`, `secret` and the autopilot's key. `numbers` are the channel
 /// parameters.
 ///
-/// Two configurations do not read back unchanged. `adjust` with a grid search becomes `adjust` with the fine search.
-/// A block with more than `MAX_POINTS` interference points is rejected.
+/// Two kinds of configuration do not read back unchanged: `adjust` with a grid search becomes `adjust` with the fine
+/// search, and a block with more than `MAX_POINTS` interference points is rejected.
 pub fn write(
     config: &Config,
     numbers: &ChannelNumbers,

@@ -24,7 +24,8 @@ pub struct ClockHardware {
     pub over_drive: bool,
 }
 
-/// Board with an STM32F405 and a crystal of 8 MHz. With another crystal, or none, it runs from the HSI.
+/// Board with an STM32F405 and a crystal of 8 MHz. With a crystal of another frequency, or none, the board runs from
+/// the HSI.
 pub const STM32F405: ClockHardware = ClockHardware {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -51,7 +52,7 @@ pub enum Source {
     Internal,
 }
 
-/// Clock frequencies that the chip runs at after [`start`].
+/// Clock frequencies of the chip after [`start`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Clocks {
     /// Frequency of the core and of its timer `SysTick`, Hz.
@@ -160,8 +161,8 @@ const CACHES: u32 = 0b11 << 9;
 /// Chip ID of an STM32F405 of revision A, whose flash prefetch is defective (ES0182).
 const NO_PREFETCH: u32 = 0x1000_0413;
 
-/// Maximum number of reads while a PLL, voltage or clock switch settles: about 10 ms at 16 MHz. The data sheets give
-/// at most 0.3 ms.
+/// Maximum number of reads while a PLL, a voltage or a clock switch settles, about 10 ms at 16 MHz. The data sheets
+/// give at most 0.3 ms.
 const POLLS: u32 = 20_000;
 
 /// Sets up the clocks of a board, and returns the frequencies reached. Takes at most 0.2 s.
@@ -169,7 +170,7 @@ const POLLS: u32 = 20_000;
 /// Call it once after a reset, with interrupts off.
 pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     if !back_to_hsi(chip) {
-        // An emulator without a clock tree.
+        // The HSI is never ready in an emulator without a clock tree.
         return Clocks::HSI;
     }
     cache(chip, 0);
@@ -201,8 +202,8 @@ pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
 
 /// Returns the frequencies that [`start`] reaches, and switches back to the HSI.
 ///
-/// Some HALs set up the clocks themselves, and wait for them without a limit. Such a HAL can be told to use only
-/// clocks that work.
+/// Some HALs set up the clocks themselves, and wait for them without a limit. The result tells such a HAL which clocks
+/// work.
 pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     let clocks = start(chip, hardware);
     if clocks.pll.is_some() && back_to_hsi(chip) {
@@ -261,7 +262,7 @@ fn off(chip: &mut impl Registers) -> bool {
 
 /// Starts the PLL, which must be off; returns false if that fails.
 ///
-/// `divisor` divides the source's frequency to 2 MHz. `scale` is the voltage scale in PWR_CR.
+/// `divisor` is the source's frequency divided by 2 MHz. `scale` is the voltage scale in PWR_CR.
 fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Pll, scale: u32) -> bool {
     chip.modify(Register::PowerControl, scale, scale);
     let from = match source {
@@ -384,7 +385,7 @@ mod tests {
     fn the_baud_rate_is_that_of_the_clock_reached() {
         for hz in [16, 42, 45, 84, 90].map(|mhz| mhz * 1_000_000) {
             let requested = crate::baud::compensated_baud(115_200, hz);
-            // Computed as stm32f4xx-hal 0.23 does, with the clock of the reset.
+            // The divisor is computed as stm32f4xx-hal 0.23 does, from the clock after a reset.
             let divisor = (16_000_000 + requested / 2) / requested;
             let baud = f64::from(hz) / f64::from(divisor);
             assert!((baud / 115_200.0 - 1.0).abs() < 2e-3, "{hz}: {baud}");

@@ -1,6 +1,6 @@
 //! Check of the crystal's frequency against the HSI. A wrong crystal would make the PLL overclock the core.
 //!
-//! TIM11 captures every eighth edge of HSE / 31, its measurement input by RM0090 and RM0390 (TIM11_OR).
+//! TIM11 captures every eighth edge of HSE / 31, which RM0090 and RM0390 provide as its input (TIM11_OR).
 
 use crate::registers::{Register, Registers};
 
@@ -23,7 +23,7 @@ const HSE_READY: u32 = 1 << 17;
 /// Bit HSEBYP of the register RCC_CR: external clock in place of a crystal.
 const HSE_BYPASS: u32 = 1 << 18;
 
-/// Maximum number of reads of RCC_CR while a crystal starts: about 100 ms at 16 MHz. A crystal usually takes 2 ms.
+/// Maximum number of reads of RCC_CR while a crystal starts, about 100 ms at 16 MHz. A crystal usually takes 2 ms.
 const START_POLLS: u32 = 200_000;
 
 /// Divisor of the crystal's clock for the measurement: field RTCPRE of RCC_CFGR.
@@ -38,7 +38,7 @@ const TIMER_ON: u32 = 1 << 18;
 /// Maximum number of status reads of the timer per capture.
 const EDGE_POLLS: u32 = 1_000;
 
-/// Starts the crystal; returns true if its frequency is right within 10 %, else turns it off again.
+/// Starts the crystal. Returns true if its frequency is right within 10 %; otherwise turns it off again.
 ///
 /// The core must run from the HSI. Takes at most 100 ms.
 pub fn start(chip: &mut impl Registers, crystal: Crystal) -> bool {
@@ -75,7 +75,7 @@ fn period(chip: &mut impl Registers) -> Option<u32> {
         // Reading the capture clears the flag.
         come.then(|| chip.read(Register::Timer11Capture))
     };
-    // The first capture may date from the set-up of the timer.
+    // The first capture may have happened during the set-up of the timer.
     let [_, from, to] = [captured(), captured(), captured()];
     chip.write(Register::Timer11Control, 0);
     chip.write(Register::Timer11Enable, 0);

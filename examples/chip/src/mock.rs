@@ -1,4 +1,5 @@
-//! Mock of the registers in RAM, for tests. It behaves as the chip and panics at what the reference manuals forbid.
+//! Mock of the registers in RAM, for tests. It behaves like the chip, and panics at accesses that the reference manuals
+//! forbid.
 
 extern crate std;
 
@@ -238,8 +239,8 @@ impl Registers for MockRegisters {
         }
     }
 
-    /// Reads the register once, because more reads would return the same value. Only the timer's status changes from
-    /// read to read.
+    /// Reads the register once, because more reads would return the same value. The only exception is the timer's
+    /// status.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

@@ -31,12 +31,12 @@ impl Reset {
         Self::of(status)
     }
 
-    /// Returns the most specific cause in `status`, a value of RCC_CSR. Several bits can be set: every reset also
-    /// sets the bit of the reset pin, and a power-up that of the brownout.
+    /// Returns the most specific cause in `status`, a value of RCC_CSR. Several bits can be set: every reset also sets
+    /// the bit of the reset pin, and a power-up also sets the bit of the brownout.
     fn of(status: u32) -> Self {
         let is = |bit: u32| status >> bit & 1 != 0;
         match status {
-            // Independent or window watchdog.
+            // The bits of the independent and of the window watchdog.
             _ if is(29) || is(30) => Self::Watchdog,
             _ if is(28) => Self::Software,
             _ if is(27) => Self::Power,

@@ -11,20 +11,20 @@ const RELOAD: u32 = 2_999;
 
 /// Time from the last feeding to the reset, ms: typical, shortest and longest.
 ///
-/// These are for a watchdog oscillator of 32, 47 and 17 kHz. Each is enough for an erase of a flash sector of 128
-/// KiB, which stops the core for at most 2 s.
+/// The watchdog's oscillator runs at 32, 47 or 17 kHz in these cases. Each time exceeds that of an erase of a flash
+/// sector of 128 KiB, which stops the core for at most 2 s.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
 /// Maximum sleep of the relay's main loop, ms. The loop feeds the watchdog before it sleeps.
 pub const TURN_MS: u64 = 500;
 
-/// Delay of the relay's timer, ms, from which on the watchdog must not be fed.
+/// Delay of the relay's timer from which on the watchdog must not be fed, ms.
 pub const LATE_MS: u64 = 1_000;
 
 /// Returns true if the main loop may feed the watchdog at `now_us`.
 ///
-/// `due_us` is when the relay's next timer expires; `None` means no timer. The timer must be less than [`LATE_MS`]
-/// late.
+/// `due_us` is the time at which the relay's next timer expires; `None` without a timer. The result is true while this
+/// timer is less than [`LATE_MS`] late.
 pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
     match due_us {
         Some(due_us) => now_us < due_us.saturating_add(1_000 * LATE_MS),
@@ -39,7 +39,7 @@ const UNLOCK: u32 = 0x5555;
 /// Value of the watchdog's key register that feeds it.
 const FEED: u32 = 0xAAAA;
 
-/// Maximum number of status reads until the settings take effect, which takes at most 0.3 ms.
+/// Maximum number of status reads until the settings take effect. They take effect within 0.3 ms.
 const POLLS: u32 = 10_000;
 
 /// Starts the watchdog, which nothing but a reset can stop. It pauses while a debugger halts the core. Bounded work.
@@ -49,8 +49,8 @@ pub fn start(chip: &mut impl Registers) {
     chip.write(Register::WatchdogKey, UNLOCK);
     chip.write(Register::WatchdogPrescaler, PRESCALER);
     chip.write(Register::WatchdogReload, RELOAD);
-    // If the settings are late, the watchdog first counts from its reset value, 0.5 s, and uses the new one after
-    // this feeding.
+    // If the settings take effect late, the watchdog first counts from its reset value, 0.5 s. After this feeding it
+    // uses the new value.
     let _ = chip.wait(Register::WatchdogStatus, 0b11, 0, POLLS);
     feed(chip);
 }

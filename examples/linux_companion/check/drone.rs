@@ -15,10 +15,10 @@ use super::Line;
 use crate::autopilot::{AutopilotPlan, Port, SigningKey, port, stamp};
 use crate::options::Plan;
 
-/// Link number of the check in MAVLink signatures; in flight another one is used.
+/// Link number of the check in MAVLink signatures; in flight a different number is used.
 const LINK: u8 = 1;
 
-/// Silence after which the autopilot, or its position, counts as missing.
+/// Age of the autopilot's last message, or of its last position, at which it counts as missing.
 const SILENT: Duration = Duration::from_millis(3_000);
 
 /// Time between two heartbeats, and between two requests.
@@ -30,7 +30,7 @@ const AT_A_TIME: usize = 6;
 /// Names of the parameter with the autopilot's MAVLink system number.
 const SYSTEM: [&str; 2] = ["MAV_SYS_ID", "SYSID_THISMAV"];
 
-/// Parameters that ArduCopter 4.7 has renamed: old name, new name, and old unit divided by new unit.
+/// Parameters that ArduCopter 4.7 has renamed: old name, new name, and old unit / new unit.
 ///
 /// An autopilot has only one of the two names.
 const NEW_NAMES: [(&str, &str, f64); 2] = [
@@ -38,7 +38,7 @@ const NEW_NAMES: [(&str, &str, f64); 2] = [
     ("SYSID_THISMAV", "MAV_SYSID", 1.0),
 ];
 
-/// Parameter of the bundle's file: the file's value, and the autopilot's, `None` until received.
+/// Parameter in the bundle's file: its value there, and that in the autopilot, `None` until received.
 #[derive(Debug)]
 struct Parameter {
     name: String,
@@ -190,7 +190,7 @@ impl Drone {
             return;
         };
         match message {
-            // Before the fix an autopilot reports 0, 0.
+            // Before its first fix an autopilot reports latitude 0 and longitude 0.
             Some(Incoming::GlobalPosition {
                 lat_e7,
                 lon_e7,
@@ -227,7 +227,7 @@ impl Drone {
         };
         let is_integer = payload.get(24).is_some_and(|kind| *kind < 9);
         let found = match kind {
-            // PX4 sends an integer's bytes in the place of a float.
+            // PX4 sends the bytes of an integer in the field for a float.
             Kind::Px4 if is_integer => f64::from(i32::from_le_bytes(*value)),
             _ => f64::from(f32::from_le_bytes(*value)),
         };
@@ -280,7 +280,7 @@ impl Drone {
                 self.send(now, request(name, from, to, self.sequence));
             }
         }
-        // If the first are not answered, the next ones are requested.
+        // If the first parameters are not answered, the next ones are requested.
         if let Some(Ok((_, all))) = &mut self.file {
             let missing = all.iter().filter(|it| it.found.is_none()).count();
             let (mut open, answered): (Vec<_>, Vec<_>) =

@@ -45,7 +45,7 @@ const TURN: Span = Span::from_millis(20);
 /// Minimum free space for the files of a flight, bytes.
 const FREE: u64 = 64 << 20;
 
-/// Seconds from 1970 to 2024. A clock with an earlier time is not set.
+/// Seconds from 1970 to 2024. A clock that shows an earlier time has not been set.
 const YEAR_2024_S: u64 = 1_704_067_200;
 
 /// Name of the bundle's udev rules, in the folder of the configuration or in /etc/udev/rules.d.
@@ -234,7 +234,7 @@ fn clock(now: SystemTime) -> Result<String, String> {
     Ok(text.to_string())
 }
 
-/// Returns the free space for `file`, bytes. A test file is written to its folder.
+/// Returns the free space for `file`, bytes. For the test, a file is written to the folder of `file`.
 fn space(file: &Path) -> Result<u64, String> {
     let failed = |error: std::io::Error| format!("cannot be written: {error}");
     let folder = file
@@ -254,7 +254,7 @@ fn space(file: &Path) -> Result<u64, String> {
             return Ok(FREE);
         }
     }
-    // Root may write everywhere, but the unit's user may not.
+    // Root may write everywhere, but the user of the systemd unit may not.
     let owner = folder.metadata().map_or(0, |about| about.uid());
     if geteuid().is_root() && owner != 0 {
         return Err(format!(

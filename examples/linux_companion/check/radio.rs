@@ -1,4 +1,4 @@
-//! Check of this relay's neighbours: heard in both directions, with the same mission, network and key.
+//! Check that neighbours and this relay receive each other, and share mission, network and key.
 //!
 //! A relay of the library answers the handshakes, but only hellos, claims, heartbeats and handshakes pass between it
 //! and the ports. So it receives and sends no proposal and no vote, and cannot become a member of the chain. On a
@@ -54,18 +54,17 @@ struct Heard {
     received: Option<Instant>,
     /// Time of its last frame to this relay with a correct authentication tag.
     verified: Option<Instant>,
-    /// Time of its last message that confirms reception of this relay.
+    /// Time of its last message that confirms that it receives this relay.
     hears: Option<Instant>,
-    /// True if its drone flies.
+    /// True if the neighbour's drone flies.
     flies: bool,
-    /// True once it sent a lease renewal: its chain has agreed positions.
+    /// True once the neighbour has sent a lease renewal, so its chain has agreed on positions.
     takes_part: bool,
-    /// First position that it reported while its relay did not fly the drone, if any.
+    /// First position that the neighbour reported while its relay did not control the drone, if any.
     stands: Option<Placement>,
     /// Digest of its mission; `None` if not received yet.
     mission: Option<u16>,
-    /// Number of frames with another key.
-    /// frame, and count frames of an old epoch.
+    /// Number of frames signed with a wrong key.
     forged: u32,
     unsigned: u32,
     network: Option<u16>,
@@ -91,7 +90,7 @@ pub(super) struct Radio {
     epoch: Option<u32>,
     heard: BTreeMap<u16, Heard>,
     sent: VecDeque<Vec<u8>>,
-    /// Number of frames from another node with this relay's number.
+    /// Number of frames from a second node with this relay's number.
     twins: u32,
     damaged: u32,
     sends_from: Instant,
@@ -149,8 +148,8 @@ impl Radio {
 
     /// Returns the numbers of the relays that may fly.
     ///
-    /// It may fly if it reports so. A relay in a chain may also fly if it has not reported that its drone is on the
-    /// ground.
+    /// A relay may fly if it reports that it does. A member of a chain also may, unless it has reported that its drone
+    /// is on the ground.
     fn flying(&self) -> Vec<String> {
         let flies = |heard: &Heard| heard.flies || heard.takes_part && heard.stands.is_none();
         let flying = self.heard.iter().filter(|(_, heard)| flies(heard));
@@ -165,7 +164,8 @@ impl Radio {
             }
         }
         let may_send = may_send && now >= self.sends_from && self.flying().is_empty();
-        // Without an agreement on a view without it, this relay is a member again. Then it leaves once more.
+        // If the chain agrees on no view without this relay, this relay becomes a member again. Then it leaves once
+        // more.
         if self.relay.departure(now) != Departure::Outside {
             self.relay.stay(now);
             self.relay.leave(now, None);
@@ -180,7 +180,7 @@ impl Radio {
         }
         let mut frame = [0; MAX_FRAME];
         loop {
-            // Its votes are not sent, so they are not stored either.
+            // This relay's votes are never sent. So they need not be stored either.
             self.relay.persist(|_| true);
             let Some(transmit) = self.relay.poll_transmit(now, &mut frame) else {
                 break;
@@ -261,7 +261,7 @@ impl Radio {
         let after = self.relay.stats();
         let more = |of: fn(&Stats) -> u32| of(after).saturating_sub(of(&before));
         if !self.sent.is_empty() {
-            // Until this relay has sent, such frames are for its earlier start.
+            // Frames received before this relay has sent any may be for its earlier start.
             heard.forged += more(|stats| stats.forged);
         }
         heard.replayed += more(|stats| stats.replayed);
@@ -385,7 +385,7 @@ impl Radio {
 }
 
 impl Heard {
-    /// Records if the sender of a message flies, and if its chain has agreed positions.
+    /// Records whether the sender of a message flies, and whether its chain has agreed on positions.
     fn observe(&mut self, content: &Content) {
         let Content::Message(message) = content else {
             return;
@@ -412,7 +412,7 @@ enum Content {
 }
 
 impl Content {
-    /// Returns true for messages without influence on any agreement. Only such messages pass.
+    /// Returns true for a message that cannot affect any agreement. Only such messages are received or sent.
     const fn is_harmless(&self) -> bool {
         use Message::{Claim, Heartbeat, Hello};
         matches!(

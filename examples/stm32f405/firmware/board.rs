@@ -15,7 +15,7 @@ pub(crate) fn block() -> &'static Block {
     unsafe { &*(config::ADDRESS as *const Block) }
 }
 
-/// Enables an interrupt. Its driver must be in place.
+/// Enables an interrupt. The interrupt's driver must be in place before.
 pub(crate) fn unmask(interrupt: Interrupt) {
     // SAFETY: no critical section of this program relies on a single interrupt being masked.
     unsafe { NVIC::unmask(interrupt) };
@@ -32,7 +32,7 @@ pub(crate) fn seed() -> u32 {
     let first = (&raw mut LEFTOVER).cast::<u32>();
     // FNV-1a over words.
     let seed = (0..WORDS).fold(0x811C_9DC5, |hash: u32, word| {
-        // SAFETY: within the array, which only this function uses, from the main loop.
+        // SAFETY: the address is within the array, which only this function uses, and only from the main loop.
         (hash ^ unsafe { read_volatile(first.add(word)) }).wrapping_mul(0x0100_0193)
     });
     // SAFETY: as above.
@@ -52,7 +52,7 @@ pub(crate) fn stop() -> ! {
 
 /// Panic handler that makes the link fail if it is used.
 ///
-/// So `cargo cost` proves that no panic is reachable.
+/// So an image that links has no reachable panic, which `cargo cost` proves.
 #[cfg(prove_no_panic)]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
@@ -85,7 +85,7 @@ mod defmt_frames {
     #[defmt::global_logger]
     struct Logger;
 
-    /// True if interrupts were enabled before the log frame: then its end enables them again.
+    /// True if interrupts were enabled before the log frame: then the end of the frame enables them again.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
     // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame,

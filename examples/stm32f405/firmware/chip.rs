@@ -46,7 +46,7 @@ pub(crate) fn end_turn(relay: &Relay, now: Instant) {
     }
 }
 
-/// Returns when the main loop must wake up: at `wake`, but at most [`TURN`] after `now`.
+/// Returns the time at which the main loop must wake up: `wake`, but at most [`TURN`] after `now`.
 pub(crate) fn latest(now: Instant, wake: Option<Instant>) -> Instant {
     let turn = now + TURN;
     wake.map_or(turn, |wake| wake.min(turn))

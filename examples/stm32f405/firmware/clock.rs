@@ -46,7 +46,7 @@ impl Clock {
     /// Sleeps until the time `wake`, if any, or until bytes arrive.
     pub(crate) fn sleep(&mut self, wake: Option<Instant>) {
         while wake.is_none_or(|wake| self.now() < wake) {
-            // An interrupt after this check of INPUT stays pending, and `wfi` returns for it.
+            // An interrupt after this check of INPUT stays pending, and makes `wfi` return.
             let input = free(|_| {
                 let input = INPUT.swap(false, Ordering::Relaxed);
                 if !input {
@@ -70,14 +70,14 @@ pub(crate) fn micros() -> u64 {
         let ticks = TICKS.borrow(cs).get();
         let count = SYST::get_current();
         if SCB::is_pendst_pending() {
-            // The millisecond is over, but its interrupt waits for the end of this section.
+            // The millisecond is over, but its interrupt waits for the end of this critical section.
             (ticks.wrapping_add(1), SYST::get_current())
         } else {
             (ticks, count)
         }
     });
     let micro = MICRO.load(Ordering::Relaxed).max(1);
-    // The counter runs down to 0 from the cycles of a millisecond, minus 1.
+    // The counter counts down to 0, starting at the number of cycles of a millisecond minus 1.
     let tick = micro.saturating_mul(1_000);
     let cycles = tick.wrapping_sub(count) % tick;
     ticks

@@ -13,7 +13,7 @@ use super::flash;
 use super::{board, config, log, persistent};
 use crate::autopilot::{Autopilot, Uart};
 
-/// Relay, state of its stored votes, and the autopilot link, if any. Relay and link are in static RAM.
+/// Relay, state of its stored votes, and the autopilot link, if any. Both relay and link are in static RAM.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut persistent::Views,
@@ -57,7 +57,7 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
 
 /// Creates the relay in static RAM, to save stack; `None` if the relay rejects the configuration.
 ///
-/// It rejects a feature that this image lacks, and the joint method for more than 100 relays.
+/// The relay rejects settings that need a feature this image lacks, and the joint method for more than 100 relays.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,
@@ -85,8 +85,8 @@ struct CannotSign;
 
 /// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 ///
-/// If the flash cannot be written, as in an emulator, the epoch is still larger than all stored ones and not below
-/// the block's. But the next start may reuse it.
+/// If the flash cannot be written, as in an emulator, the epoch is still larger than all stored ones and not below the
+/// block's. But the next start may use the same epoch.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {

@@ -81,8 +81,8 @@ impl Sector {
     }
 
     const fn words<'a>(self) -> &'a [u32] {
-        // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors`
-        // that is borrowed while the slice lives.
+        // SAFETY: the words are a part of the flash, always readable and aligned. Only this file writes there, through
+        // a `Sectors` that is borrowed while the slice lives.
         unsafe { core::slice::from_raw_parts(self.0 as *const u32, self.len()) }
     }
 
@@ -100,7 +100,7 @@ impl Sector {
     #[inline(never)]
     fn erase(self) {
         let flash = unlocked();
-        // SAFETY: the number of a sector that no image reaches.
+        // SAFETY: the number is that of a sector that no image reaches.
         flash.cr().write(|w| unsafe {
             w.psize()
                 .bits(BY_WORD)
@@ -130,12 +130,12 @@ impl Sector {
         }
         let first = (self.0 as *mut u32).wrapping_add(first);
         let flash = unlocked();
-        // SAFETY: a valid size for this register.
+        // SAFETY: the value is a valid size for this register.
         flash
             .cr()
             .write(|w| unsafe { w.psize().bits(BY_WORD).pg().set_bit() });
         for (at, word) in words.iter().enumerate() {
-            // SAFETY: inside the sector, and aligned.
+            // SAFETY: the address is inside the sector, and aligned.
             unsafe { write_volatile(first.wrapping_add(at), *word) };
             wait(&flash);
         }
@@ -162,7 +162,7 @@ fn unlocked() -> FLASH {
     flash
 }
 
-/// Waits until the flash is idle, as each command requires. The hardware delays reads by itself.
+/// Waits until the flash is idle, as each command requires. Reads need no such wait, because the hardware delays them.
 fn wait(flash: &FLASH) {
     while flash.sr().read().bsy().bit_is_set() {}
 }

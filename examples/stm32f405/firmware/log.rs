@@ -1,7 +1,7 @@
 //! Log lines, with `--features defmt`. They go to a UART (`uart_log.rs`) or to the debug probe.
 //!
 //! With `--features rtt`, `probe-rs run` prints them. They are then written to RAM without blocking. The probe cannot
-//! request the counters, and frames that it reads too slowly are lost uncounted.
+//! request the counters. Frames that it reads too late are lost and not counted.
 #![allow(
     clippy::match_same_arms,
     clippy::if_same_then_else,
@@ -33,7 +33,7 @@ use super::uart_log::lost;
 #[cfg(feature = "rtt")]
 use defmt_rtt as _;
 
-/// Returns false: without a log over a UART the counters cannot be requested.
+/// Returns false, because the counters can be requested only with a log over a UART.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 pub(crate) const fn counters_requested() -> bool {
     false

@@ -64,7 +64,8 @@ impl<U: Instance> Served<U> {
     }
 }
 
-/// Returns the settings of a UART whose clock is `apb_hz`. The HAL assumes another clock, so the rate is corrected.
+/// Returns the settings of a UART whose clock is `apb_hz`. The HAL assumes a different clock, so the bit rate is
+/// corrected.
 pub(crate) fn config(apb_hz: u32) -> Config {
     Config::default().baudrate(compensated_baud(BAUD, apb_hz).bps())
 }

@@ -1,7 +1,7 @@
 //! Uploaded missions, persisted across a reboot.
 //!
-//! They are in a [`Journal`](uav_relay_kept::journal::Journal) whose key is the CRC of the configuration block. With
-//! another block they are ignored, and the drone flies the mission of that block.
+//! They are in a [`Journal`](uav_relay_kept::journal::Journal) whose key is the CRC of the configuration block. After a
+//! change of the block they are ignored, and the drone flies the mission of the new block.
 //!
 //! An upload in flight erases nothing, because an erase of these sectors stops the CPU for 1 to 2 s. A sector of 128
 //! KiB holds 1024 records, so at least as many uploads are stored between two starts. Further ones are flown but not

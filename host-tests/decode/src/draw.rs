@@ -1,7 +1,7 @@
 //! Random messages from the tables, for the wire tests, the fuzz targets and the dissector's test.
 //!
-//! Valid messages cover the whole range of every field, and often its bounds. Arbitrary messages are well-formed,
-//! with any numbers.
+//! Valid messages cover the whole range of every field, and often its bounds. Arbitrary messages are well-formed, but
+//! their numbers may be out of range.
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -30,10 +30,10 @@ const ORDINARY: [(&str, f64, f64); 13] = [
     ("interferer_y_m", -2e3, 2e3),
 ];
 
-/// Function that may choose the value of a field; with `None` the value is random.
+/// Function that may choose the value of a field. If it returns `None`, the value is random.
 pub type Hint<'a> = dyn FnMut(&mut Draw<'_>, &Field) -> Option<Value<'static>> + 'a;
 
-/// Generator of random messages from bytes: of a random generator, or of a fuzzer.
+/// Generator of random messages from bytes: from a random generator or a fuzzer.
 pub struct Draw<'s> {
     source: &'s mut dyn FnMut() -> u8,
 }
@@ -76,7 +76,7 @@ impl<'s> Draw<'s> {
 
     /// Draws the fields of a message. `hint` may choose a number, even one outside its permitted range.
     ///
-    /// With `None` the number is random and in range.
+    /// If `hint` returns `None`, the number is random and in range.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
         obey_rules(&layout.name, &mut fields);
@@ -179,7 +179,7 @@ impl<'s> Draw<'s> {
             4 => f32::from_bits(1).into(),
             5..8 => least + self.part() * (most - least),
             side => {
-                // Any magnitude, on either side of 0 if the range has it.
+                // Any magnitude, positive or negative as far as the range permits.
                 let bottom = least.max(-most).max(1e-40).log10();
                 let top = most.abs().max(least.abs()).log10();
                 let number = 10_f64.powf(bottom + self.part() * (top - bottom));
@@ -225,7 +225,7 @@ impl<'s> Draw<'s> {
             }
             Kind::Group(fields) => Value::Group(self.arbitrary(fields)),
             Kind::F32 if self.chance(2) => Value::Single((self.part() * 4e3 - 2e3) as f32),
-            // In half of the draws the value has a name.
+            // In half of the draws the value is one that has a name.
             Kind::Words(words) if self.chance(2) => {
                 let word = usize::from(self.byte()) % words.len().max(1);
                 Value::Word(word as u8, None)
@@ -258,7 +258,7 @@ impl<'s> Draw<'s> {
     }
 }
 
-/// Reorders the views in a Decision so that they ascend: base, accepted, proposed.
+/// Reorders the views in a Decision into ascending order: base, accepted, proposed.
 fn decision(fields: &mut Fields<'_>) {
     let get = |fields: &Fields<'_>, name: &str| Numbers(fields).get(name);
     let (base, view) = (get(fields, "base_view"), get(fields, "proposed_view"));
@@ -388,7 +388,7 @@ fn proposal(fields: &mut Fields<'_>) {
     order.sort_unstable();
     let last = order.pop().unwrap_or_default();
     if order.contains(&last) {
-        // No view is older than the proposed one, so none is agreed on or accepted.
+        // No view is older than the proposed one, so no view is agreed on or accepted.
         order = vec![0];
         successor = Some(Value::None);
     }

@@ -36,7 +36,7 @@ pub fn stuffed(plain: &[u8]) -> Vec<u8> {
 
 /// Decodes `stuffed`, a frame without its delimiter, by the definition of COBS.
 ///
-/// Also returns true if the last COBS run is complete. Unlike other decoders it returns the bytes before a cut.
+/// Also returns true if the last COBS run is complete. If it is not, the bytes up to the cut are returned as well.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {
     let mut plain = Vec::with_capacity(stuffed.len());
     let (mut rest, mut whole) = (stuffed, true);

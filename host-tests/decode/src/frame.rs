@@ -25,13 +25,13 @@ pub struct Frame<'f> {
     pub handshake: bool,
     /// Decoded fields of the body, up to the first field that cannot be decoded.
     pub fields: Fields<'f>,
-    /// Signed part of the frame (header and body), and its authentication tag, if it has one.
+    /// Signed part of the frame (header and body), and the frame's authentication tag, if it has one.
     pub tag: Option<(Vec<u8>, [u8; TAG])>,
     /// Reason why a receiver rejects the frame, if it does.
     pub refusal: Option<Refusal>,
 }
 
-/// Decodes a frame. `wire` has its bytes with the delimiter, or only the first of them.
+/// Decodes a frame. `wire` has the bytes of the frame with its delimiter, or only the first of these bytes.
 ///
 /// `len` is the length of the whole frame on the wire. The crate's decoder decides if a receiver rejects the frame.
 /// The tables of `FORMAT.md` give the fields, and the reason.

@@ -19,7 +19,7 @@ pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
 
 /// Returns true if the value is in the field's range in `FORMAT.md`.
 ///
-/// Rules between fields, which may follow in the range after a semicolon, are not checked here.
+/// Rules between several fields, which may follow the range after a semicolon, are not checked here.
 fn is_within(field: &Field, value: &Value<'_>) -> bool {
     let all = |values: &[Value<'_>]| values.iter().all(|value| is_within(field, value));
     match value {
@@ -33,7 +33,7 @@ fn is_within(field: &Field, value: &Value<'_>) -> bool {
         Value::Double(number) if !number.is_finite() => false,
         Value::View(view) => is_view(&field.range, *view),
         Value::Single(number) => {
-            // The bounds are rounded to f32; 0 may be permitted besides.
+            // The bounds are rounded to f32; 0 may be permitted in addition to the range.
             let (zero, least, most) = bounds(&field.range);
             let between = (least as f32..=most as f32).contains(number);
             between || zero && number.to_bits() == 0
@@ -53,7 +53,7 @@ fn is_between(range: &str, number: f64) -> bool {
 
 /// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`.
 ///
-/// Returns true if 0 is permitted besides, and the two bounds.
+/// Returns a flag and the two bounds. The flag is true if 0 is permitted in addition to the range.
 pub fn bounds(range: &str) -> (bool, f64, f64) {
     let first = range.split(';').next().unwrap_or_default();
     let (zero, rest) = ["`00000000` or ", "0 or "]
@@ -70,7 +70,7 @@ pub fn bounds(range: &str) -> (bool, f64, f64) {
             (zero, number(least), number(most))
         }
         None if rest == "any" => (zero, f64::MIN, f64::MAX),
-        // A range that cannot be parsed permits nothing, so that a test finds it.
+        // If a range cannot be parsed, no value is permitted, so that a test finds the range.
         None => (false, f64::NAN, f64::NAN),
     }
 }
@@ -107,7 +107,7 @@ impl<'f> Numbers<'_, 'f> {
         number == 0.0 && number.is_sign_positive()
     }
 
-    /// Returns true if a lease renewal has no group `nodes`, or a node in it that is not 0.
+    /// Returns true if a lease renewal has no group `nodes`, or if a node number in this group is not 0.
     fn names_a_node(&self) -> bool {
         let mut names = ["leaver", "joiner", "spare"].into_iter();
         self.group("nodes")
@@ -243,8 +243,9 @@ pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
 
 /// Returns the target SIRs (linear) that a sweep message lists in compact form, in ascending order.
 ///
-/// `anchor` is one of them. `gap` encodes the relative gap to the next one, 0 for a single target. `growth` encodes
-/// the factor from each gap to the next. Results are rounded to f32, as in a relay.
+/// `anchor` is one of the targets. `gap` encodes the gap from `anchor` to the next target, as a fraction of `anchor`; 0
+/// for a single target. `growth` encodes the factor from each gap to the next. Results are rounded to f32, as in a
+/// relay.
 pub fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];

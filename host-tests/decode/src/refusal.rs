@@ -7,19 +7,19 @@ use std::fmt;
 pub enum Refusal {
     /// The stream ends before the frame's delimiter.
     Unended,
-    /// The frame is too long: its length on the wire, bytes.
+    /// The frame is too long. The value is its length on the wire, bytes.
     Oversized(usize),
-    /// A delimiter inside a COBS run: the frame was cut short.
+    /// The frame was cut short: there is a delimiter inside a COBS run.
     Truncated,
-    /// The frame is too short for header and CRC, or for the tag: its length without COBS, bytes.
+    /// The frame is too short for header and CRC, or for the tag. The value is its length without COBS, bytes.
     Short(usize),
-    /// The CRC is wrong: the received and the computed CRC.
+    /// The CRC is wrong. The values are the received and the computed CRC.
     Crc(u32, u32),
-    /// The version of the format or the flags are unknown: version and flags.
+    /// The version of the format or the flags are unknown. The values are the version and the flags.
     Version(u8, u8),
     /// The message tag (kind of message) is unknown.
     UnknownTag(u8),
-    /// The body is not the canonical encoding of a message; with the fault.
+    /// The body is not the canonical encoding of a message. The value names the fault.
     Malformed(String),
     /// A number in the message is out of range.
     Range,

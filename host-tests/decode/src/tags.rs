@@ -21,7 +21,7 @@ pub enum TagCheck {
 }
 
 impl TagCheck {
-    /// Returns the result of the tag's check as a text for people.
+    /// Returns the result of the tag's check as a sentence for people.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Right => "tag right",
@@ -31,7 +31,7 @@ impl TagCheck {
         }
     }
 
-    /// Returns the result as one word, for programs.
+    /// Returns the result of the tag's check as one word, for programs.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -42,12 +42,12 @@ impl TagCheck {
     }
 }
 
-/// Number of newest nonces stored for a node. A tag is right if it fits any of them.
+/// Number of newest nonces stored for a node. A tag counts as right if it is right with any of them.
 ///
 /// The last one is not enough: a frame signed before a new handshake can arrive after it.
 const TRIED: usize = 4;
 
-/// Key of the stored nonces: network, sender and destination.
+/// Map key of the stored nonces: network, sender and destination.
 type Pair = (u16, u16, u16);
 
 /// Verifier of authentication tags, with the nonces of all captured handshakes.

@@ -56,7 +56,7 @@ impl<'f> Fields<'f> {
     }
 }
 
-/// Conversion of a value to a Rust type by serde, as on the wire: digests and flags are numbers.
+/// Conversion of a value to a Rust type by serde, where digests and flags are numbers, as on the wire.
 impl<'de> Deserializer<'de> for &Value<'_> {
     type Error = de::value::Error;
 

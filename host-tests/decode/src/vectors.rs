@@ -76,9 +76,9 @@ pub struct Signed {
 /// Test vector: a list of target SIRs, and its compact form in a sweep message.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Target SIR with index 7 of 0 to 15, or the only one: the bits of its f32, hexadecimal.
+    /// Target SIR with index 7 of 16 (from 0), or the only target: the bits of its f32, hexadecimal.
     pub anchor: String,
-    /// Code of the relative gap to the next targets; 0 for a single target.
+    /// Code of the gap from the anchor to the next targets (a ratio); 0 for a single target.
     pub gap: u8,
     /// Code of the factor from each gap to the next one, away from the anchor.
     pub growth: u8,

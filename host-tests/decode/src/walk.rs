@@ -21,7 +21,7 @@ impl Rest<'_> {
         self.take::<1>().map(|[byte]| byte)
     }
 
-    /// Reads a varint of the postcard format. It is an error if it is not in its shortest form.
+    /// Reads a varint of the postcard format. Returns an error if the varint is not in its shortest form.
     fn varint(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
@@ -67,7 +67,7 @@ pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Field
     }
 }
 
-/// Decodes the fields `fields` from `body`. Also returns an error if bytes are missing or left over.
+/// Decodes the fields `fields` from `body`. The second result is an error text if bytes are missing or left over.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();

@@ -60,7 +60,7 @@ fn one(kind: &Kind, value: &Value<'_>, body: &mut Vec<u8>) {
         (_, Value::Bool(said)) => body.push((*said).into()),
         (_, Value::Flags(bits, _)) => body.push(*bits),
         (_, Value::Word(word, _)) => body.push(*word),
-        // Only an Option can be empty, and only the two kinds above have several values.
+        // Only an Option can have no value, and only the two kinds above can have several values.
         (_, Value::None | Value::List(_)) => {}
     }
 }

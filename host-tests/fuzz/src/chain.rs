@@ -17,7 +17,7 @@ const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
 
-/// Maximum number of frames in transit to one relay. A further frame displaces the oldest.
+/// Maximum number of frames in transit to one relay. One more frame replaces the oldest.
 const MAX_IN_TRANSIT: usize = 24;
 
 /// Maximum number of rounds in one operation. In a round each relay receives one frame.
@@ -25,14 +25,15 @@ const MAX_ROUNDS: u8 = 128;
 
 /// Tolerance for the separation of two relays, as a fraction of the distance from Tx to Rx.
 ///
-/// Positions are rounded to f32, which can bring two relays closer by this much.
+/// Positions are rounded to f32, which can reduce the distance of two relays by this much.
 const ROUNDING: f64 = 1.3e-7;
 
 /// Fuzz target. Reads `data` as a mission, the relays' settings, and operations on the frames between relays.
 ///
 /// # Panics
-/// A relay breaks a rule that the module `watch` checks. Or two neighbours are too close, although their positions come
-/// from the same pass, a message along the chain and back. Or the chain does not agree after the faults have ended.
+/// A relay breaks a rule that the module `watch` checks. Or two neighbours are too close to each other, although their
+/// positions come from the same pass (a message along the chain and back). Or the chain does not agree after the faults
+/// have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }
@@ -184,7 +185,7 @@ impl Chain {
         }
     }
 
-    /// Delivers the oldest frame to relay `at` in two pieces. `input` chooses if the second one is lost.
+    /// Delivers the oldest frame to relay `at` in two pieces. `input` decides if the second piece is lost.
     fn cut(&mut self, at: usize, input: &mut Input<'_>) {
         let (place, lost) = (usize::from(input.byte()), input.flag());
         if let Some(frame) = self.take(at) {
@@ -224,7 +225,7 @@ impl Chain {
 
     /// Delivers the oldest frame to each relay, without faults.
     ///
-    /// Without a frame in transit the time is first advanced to the next timeout.
+    /// If no frame is in transit, the time is first advanced to the next timeout.
     fn round(&mut self) {
         if self.members.iter().all(|member| member.arriving.is_empty()) {
             self.wake();
@@ -258,8 +259,8 @@ impl Chain {
         if let Some(member) = self.members.get_mut(at) {
             member.watched = watched;
         }
-        // The leader's pass numbers start again, perhaps with an old number. View numbers start again if most relays
-        // have lost them.
+        // After its restart, the leader numbers its passes anew, perhaps with an old number. View numbers start anew if
+        // most relays have lost them.
         for member in &mut self.members {
             member.watched.forget_pass();
         }
@@ -348,7 +349,7 @@ impl Chain {
 
     /// Checks the separation of relay `at` (from 0) from the previous relay.
     ///
-    /// Only if both positions come from the same pass, a message along the chain and back.
+    /// The check applies only if both positions come from the same pass (a message along the chain and back).
     fn check_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

@@ -2,7 +2,7 @@
 
 use uav_relay::Stats;
 
-/// Returns the number of received frames with a valid CRC. Each is in exactly one of the summed counters.
+/// Returns the number of received frames with a valid CRC. Each such frame is in exactly one of the summed counters.
 ///
 /// `key` is true if the relay has a signing key. It then counts unsigned frames in `unsigned`; without a key they are
 /// accepted.

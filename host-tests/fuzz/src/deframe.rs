@@ -1,4 +1,4 @@
-//! Fuzz target: a byte stream has the same frames however it is split.
+//! Fuzz target: a byte stream gives the same frames, however it is split into pieces.
 
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{MAX_DECODED, MAX_FRAME};
@@ -51,7 +51,7 @@ fn frames_by_definition(stream: &[u8]) {
     }
 }
 
-/// Checks that a relay handles a stream alike in one and in many pieces.
+/// Checks that a relay handles a stream in the same way in one piece and in many.
 ///
 /// The pieces have two alternating lengths of 1 to 256 bytes.
 fn cut(stream: &[u8], lengths: u16) {

@@ -1,4 +1,4 @@
-//! Fuzz target: bytes with a valid CRC. A decoded frame is encoded identically.
+//! Fuzz target: bytes with a valid CRC. If they decode to a frame, it must encode to the same bytes.
 
 use std::sync::LazyLock;
 
@@ -21,7 +21,7 @@ use super::watch::NETWORK;
 
 const CHECK: usize = 4;
 
-/// Byte of input with which `setting::of_chain` chooses signed frames.
+/// Input byte for which `setting::of_chain` selects signed frames.
 const SIGNS: u8 = 8;
 
 /// Fuzz target. Reads `data` as header and body of a frame, adds CRC and COBS, and decodes it.
@@ -48,7 +48,7 @@ pub fn frame(data: &[u8]) {
         assert_eq!(len, 0, "nobody writes to 4095");
         return;
     }
-    // Encoding it again omits the tag.
+    // The re-encoded frame has no tag.
     let mut bare = plain.clone();
     if frame::open(&bare).is_ok_and(|opened| opened.tag.is_some()) {
         bare.truncate(bare.len() - TAG - CHECK);
@@ -93,8 +93,8 @@ fn check_decoded(plain: &[u8]) {
 
 /// Checks that a relay which requires authentication tags verifies them.
 ///
-/// A frame with this body, valid addresses and a valid tag must be accepted, but only once. With a flipped bit it
-/// must be counted as forged.
+/// A frame with the body of `plain`, valid addresses and a valid tag must be accepted, but only once. With a flipped
+/// bit, the frame must be counted as forged.
 fn check_signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
     let Some(HandshakenPair {
@@ -202,7 +202,7 @@ fn check_round_trip(plain: &[u8], wire: &[u8]) {
     }
 }
 
-/// Checks that the CRC detects a flipped bit. The CRC itself chooses the bit.
+/// Checks that the CRC detects a flipped bit. The value of the CRC selects the bit.
 fn check_flipped_bit(plain: &[u8]) {
     let mut plain = plain.to_vec();
     let bits = plain.len() * 8;

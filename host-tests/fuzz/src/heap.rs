@@ -15,7 +15,7 @@ thread_local! {
 pub struct Counting;
 
 fn count() {
-    // An ending thread has no counter any more.
+    // A thread that ends no longer has a counter.
     _ = ASKED.try_with(|asked| asked.set(asked.get().wrapping_add(1)));
 }
 

@@ -1,6 +1,6 @@
 //! A fuzzer's bytes, read as choices, numbers in a range, and pieces of a stream.
 //!
-//! Reads past the end return zeros, so every byte string is an input, and a truncated one means nearly the same.
+//! Reads past the end return zeros, so every byte string is an input, and a truncated one has nearly the same effect.
 
 use uav_relay_scenario::number::narrow;
 
@@ -52,7 +52,7 @@ impl<'a> Input<'a> {
         self.byte() % 2 == 1
     }
 
-    /// Reads a choice from 0 to `count` - 1; `count` must be above 0.
+    /// Reads a number from 0 to `count` - 1; `count` must be above 0.
     pub fn below(&mut self, count: u8) -> u8 {
         self.byte() % count.max(1)
     }
@@ -83,7 +83,7 @@ impl<'a> Input<'a> {
         narrow(f64::from(low) * ratio.powf(part)).clamp(low, high)
     }
 
-    /// Reads any f32 in one case of sixteen, otherwise calls `usual`.
+    /// Reads any f32 in one case of sixteen; otherwise returns the result of `usual`.
     pub fn mostly(&mut self, usual: impl FnOnce(&mut Self) -> f32) -> f32 {
         if self.byte() % 16 == 15 {
             self.any_number()

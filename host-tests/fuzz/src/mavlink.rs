@@ -64,7 +64,7 @@ fn frames_by_definition(bytes: &[u8], placed: &[Placed]) {
         bytes.len()
     );
     for &Placed { at, .. } in placed {
-        // An inserted frame must be found, unless it lies inside another valid frame.
+        // An inserted frame must be found, unless it lies inside a different valid frame.
         let is_in = |frame: &reference::Frame| (frame.at..frame.end).contains(&at);
         assert!(reference.frames.iter().any(is_in), "lost at {at}");
     }

@@ -71,7 +71,7 @@ impl Member {
         }
     }
 
-    /// Returns this neighbour with another signing key.
+    /// Returns this neighbour with a wrong signing key.
     pub fn with_other_key(&self) -> Self {
         let mut other = self.clone();
         for byte in &mut other.key {

@@ -15,7 +15,7 @@ pub use parts::RelayState;
 
 /// Builds a message body of one of the kinds 0 to 22 except 20, or of arbitrary bytes.
 ///
-/// Some fields are drawn near `state`, so that the tested relay often accepts the message.
+/// Some fields have values near those in `state`, so that the tested relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     let tag = match input.below(16) {
         15 => 15 + input.below(6),
@@ -51,7 +51,7 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
         19 => body.level(),
         _ => {
             body.bytes = body.input.piece().to_vec();
-            // So the recorded inputs have the same meaning as before.
+            // This order keeps the meaning of the recorded inputs.
             match *body.bytes {
                 [21] => body.pass_of_mission(),
                 [22] => body.report(),
@@ -64,8 +64,8 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
 
 /// Additional field of a sweep message: none, Upsilon = E[1 / interference], or the lateral position.
 ///
-/// It follows the sender's power. After it comes, for each target SIR, the farthest position of the sender with that
-/// SIR.
+/// The field follows the sender's power. After the field comes, for each target SIR, the farthest position of the
+/// sender with that SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,
@@ -79,7 +79,7 @@ impl Body<'_, '_> {
         let plain = self.input.flag();
         self.sir();
         if plain {
-            // The anchor's sign bit marks a variant of the message.
+            // The sign bit of the anchor (a target SIR) marks a variant of the message.
             if let Some(byte) = self.bytes.last_mut() {
                 *byte ^= 0x80;
             }

@@ -60,7 +60,7 @@ struct Bench {
     now: Instant,
     /// Simulated neighbours upstream and downstream.
     ///
-    /// `None` if the relay does not require tags, or if the neighbour does not know the relay's nonce.
+    /// An entry is `None` if the relay does not require tags, or if that neighbour does not know the relay's nonce.
     members: [Option<Member>; 2],
 }
 
@@ -123,7 +123,8 @@ impl Bench {
 
     /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake.
     ///
-    /// `None` if this neighbour is a relay. The relay only answers handshakes of Tx and Rx, so these begin.
+    /// `None` if this neighbour is a relay. The relay only answers handshakes of Tx and Rx, so Tx or Rx sends the first
+    /// one.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();
@@ -136,13 +137,13 @@ impl Bench {
         let heard = sent
             .last()
             .and_then(|frame| Member::from_handshake(&frame.bytes));
-        // The handshake sent above counts as one of an earlier start.
+        // The relay counts the handshake sent above as one from an earlier start.
         heard.map(|member| member.restarted())
     }
 
     /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream), and delivers its handshake.
     ///
-    /// With `None` this side has no neighbour any more.
+    /// With `None` the relay has no neighbour at this side any more.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -168,7 +169,7 @@ impl Bench {
         match input.below(16) {
             0 => self.advance_time(Duration::from_micros(u64::from(input.word()))),
             1 => self.advance_time(Duration::from_millis(u64::from(input.word()))),
-            // Time should not run backward. If it does, it may only cause delays.
+            // Time should not run backward. If it does, only delays may result.
             2 => {
                 let back = u64::from(input.word());
                 self.now = Instant::from_micros(self.now.as_micros().saturating_sub(back));
@@ -188,7 +189,7 @@ impl Bench {
     /// Delivers arbitrary bytes to the relay.
     ///
     /// If they contain a valid handshake, the relay's nonces change, and the simulated neighbours, which do not know
-    /// them, are removed.
+    /// the new nonces, are removed.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
@@ -257,13 +258,13 @@ impl Bench {
 
     /// Delivers a message with a valid CRC. Header and port are mostly those of a neighbour.
     ///
-    /// Sometimes one of them has another value.
+    /// Sometimes one of the two has a different value.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);
         let (mut header, mut port) = from(self.index, side, self.wiring);
         match how / 2 % 32 {
-            // This node may become a neighbour on a shared channel.
+            // The sender may become a neighbour of the relay on a shared channel.
             23..27 => header.sender = far(self.index, side, how / 64 + 1),
             // The top bits of this word are the version.
             27 => header.sender |= 0x2000,
@@ -321,7 +322,7 @@ impl Bench {
 
     /// Delivers a frame, and checks that the relay counts it as `counter` says.
     ///
-    /// `counter` is `None` at a port that is not connected.
+    /// `counter` is `None` at a port that the relay does not use.
     fn deliver(&mut self, port: Port, wire: &[u8], counter: Option<ExpectedCounter>) {
         let before = self.watched.relay().clone();
         self.watched.bytes(self.now, port, wire);
@@ -348,7 +349,7 @@ impl Bench {
 
     /// Builds a frame with this body, signed if the relay requires tags.
     ///
-    /// Sometimes it is altered, unsigned, or signed with a wrong key or nonce.
+    /// In some cases the frame is altered, unsigned, or signed with a wrong key or nonce.
     fn test_frame(
         &mut self,
         side: usize,
@@ -375,7 +376,7 @@ impl Bench {
                 member.with_other_key().signed(header, body),
                 ExpectedCounter::Forged,
             ),
-            // After a restart, but without a new handshake.
+            // The neighbour signs as after a restart, but without a new handshake.
             13 => (
                 member.restarted().signed(header, body),
                 ExpectedCounter::Forged,

@@ -1,4 +1,4 @@
-//! Missions and settings of relays from a fuzzer's bytes, in the accepted ranges including limits.
+//! Missions and settings of relays from a fuzzer's bytes, within the accepted ranges, limits included.
 
 use uav_relay::GuardConfig;
 use uav_relay::channel::AirGround;
@@ -10,7 +10,7 @@ use uav_relay::{Auth, Key};
 
 use super::input::Input;
 
-/// Interference along x in some missions: the same everywhere.
+/// Interference along x in some missions: the same at every x.
 ///
 /// A `Field` borrows its points until the program ends, so these are constants.
 const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
@@ -18,7 +18,7 @@ const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
 /// Interference along x in some missions: changes by a factor of 10 000 within 10 m.
 const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
-/// Interference along x in some missions: weakest permitted at Tx, strongest at 1 km.
+/// Interference along x in some missions: the weakest permitted at Tx, the strongest permitted at 1 km.
 const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
 /// Interferer in the missions with a lateral range.
@@ -37,8 +37,8 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
 
 /// Creates a mission of 1 to `most` relays; `None` if its parameters are rejected.
 ///
-/// Half of the missions are the paper's scenario with one change. They take few bytes of input, so the rest reaches
-/// many states of the chain. The other half takes every parameter from its whole range.
+/// Half of the missions are the paper's scenario with one change. These missions take few bytes of input, so the
+/// remaining bytes reach many states of the chain. In the other half, every parameter is from its whole range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     let drawn = input.byte();
     let (kind, variant) = (drawn % 14, drawn / 14 % 8);
@@ -48,7 +48,7 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
         _ => tame(kind, relays)?,
     };
     let config = match (variant, config.interference) {
-        // The relays do not know the interferer.
+        // In this mission the relays do not know the interferer.
         (6, Interference::Source(_)) => MissionConfig {
             interference: Interference::Unknown,
             ..config
@@ -112,7 +112,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
             interference: Interference::Field(STEEP),
             ..paper
         },
-        // A range of altitudes, and a lateral range on both sides.
+        // The mission has a range of altitudes, and a lateral range to the left and right.
         _ => MissionConfig {
             band: Band {
                 least_m: 20.0,
@@ -192,7 +192,7 @@ pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     }
 }
 
-/// Reads an interferer with x between Tx and Rx, at Rx or outside, and y of 0 or other.
+/// Reads an interferer with x between Tx and Rx, at Rx or outside, and y of 0 or any other value.
 ///
 /// `distance_m` is the distance from Tx to Rx, m.
 fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {
@@ -224,7 +224,7 @@ fn channel(input: &mut Input<'_>) -> Option<Channel> {
     Channel::from_db(carrier_hz, los.into(), nlos.into(), air_ground).ok()
 }
 
-/// Reads the settings of one relay of `mission`. `chain` has those of the whole chain.
+/// Reads the settings of one relay of `mission`. `chain` has the settings that all relays of the chain share.
 pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Settings {
     let own = input.byte();
     let profile = (own % 4 == 1).then(|| Profile {

@@ -173,7 +173,7 @@ impl Watched {
         });
     }
 
-    /// Reports to the relay that its drone was at `place` at the time `at`.
+    /// Reports to the relay at `now` that its drone was at `place` at the time `at`.
     pub fn position(&mut self, now: Instant, at: Instant, place: Placement) {
         heap::without_allocation(|| self.relay.handle_position(now, place, at));
     }
@@ -185,7 +185,7 @@ impl Watched {
 
     /// Uploads a mission to the relay, which may refuse it.
     pub fn upload(&mut self, now: Instant, upload: &Upload) {
-        // An older mission is refused, and any mission by a relay without a key.
+        // The relay refuses an older mission, and without a key any mission.
         _ = heap::without_allocation(|| self.relay.handle_upload(now, upload));
     }
 
@@ -237,8 +237,8 @@ impl Watched {
 
     /// Checks the relay's view (membership of the chain).
     ///
-    /// Views rise; each is reported and counted. The relay's index must be in it, and the neighbours before and
-    /// after.
+    /// View numbers must rise, and each view must be reported and counted. The view must include the relay's index, and
+    /// its neighbours the indices before and after.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -268,13 +268,13 @@ impl Watched {
 
     /// Checks the relay's setpoint, and that each of its changes is reported.
     ///
-    /// Without a collision guard it must be the agreed position. With one it must be in the geofence, or no farther
-    /// outside than before.
+    /// Without a collision guard the setpoint must be the agreed position. With a guard it must be in the geofence, or
+    /// no farther outside than before.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
         assert!(told || setpoint == self.setpoint, "moved in silence");
-        // Without a setpoint are a passive relay, and a relay whose Tx and Rx positions have changed since the last
+        // A relay has no setpoint while it is passive, and if its Tx and Rx positions have changed since the last
         // agreement.
         let moved = self.sites != self.relay.sites();
         let silent = self.relay.is_passive() || moved;
@@ -287,11 +287,11 @@ impl Watched {
         };
         if let Some(GuardConfig { mut geofence, .. }) = self.settings.guard {
             if self.relay.sites().is_some() {
-                // A more distant receiver extends the geofence.
+                // If the receiver moves away from Tx, the geofence becomes longer.
                 let longer_m = self.relay.mission().config().distance_m - self.loaded_m;
                 geofence.most_x_m += longer_m;
             }
-            // The first setpoint may be anywhere. From outside the geofence it must not move farther out.
+            // The first setpoint may be anywhere. A setpoint outside of the geofence must not move farther out.
             let before = before.unwrap_or(place);
             for (is, was, least, most) in [
                 (place.x_m, before.x_m, geofence.least_x_m, geofence.most_x_m),

@@ -16,12 +16,12 @@ use uav_relay_capture::Direction;
 
 use crate::recording::{Frame, Recording, retain};
 
-/// Length of a time window with one clock offset, s. Clocks drift by at most 100 ppm: 2 ms in a window.
+/// Length of a time window with one clock offset, s. Clocks are assumed to drift by at most 100 ppm: 2 ms in a window.
 const WINDOW: f64 = 20.0;
 
 /// Minimum step of a clock, s.
 ///
-/// It is a change of the offset between two common frames, or a time that goes back.
+/// A step is a change of the clock offset from one common frame to the next, or a time that goes back.
 const STEP: f64 = 2.0;
 
 /// Maximum time between two capture files of one flight without a common frame, s.
@@ -29,7 +29,7 @@ const STEP: f64 = 2.0;
 /// Two consecutive frames of a file have the same limit.
 const APART: f64 = 3_600.0;
 
-/// Offset of a file's clock from the first file's clock.
+/// Relation of a file's clock to the first file's clock.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
     /// Name of the capture file.
@@ -42,7 +42,7 @@ pub struct Alignment {
 
 /// Part of a file without a step of its clock, from the frame `from` on.
 ///
-/// `offsets` has pairs of a time of that clock and its offset, s.
+/// `offsets` has pairs of a time of the file's clock and the offset at that time, s.
 struct Segment {
     from: usize,
     offsets: Vec<(f64, f64)>,
@@ -100,7 +100,7 @@ impl Window {
     }
 }
 
-/// Returns the index of each frame, by its bytes; `None` if it occurs several times in the file.
+/// Returns the index of each frame, by the frame's bytes; `None` if the frame occurs several times.
 fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     let mut known = HashMap::new();
     for (index, frame) in frames.iter().enumerate() {
@@ -112,7 +112,7 @@ fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
 
 /// Frames of the aligned files by their bytes: time of the reference clock, and direction.
 ///
-/// Of a frame that was sent and received the sent one counts.
+/// If a frame was both sent and received, the sent one counts.
 type Aligned = HashMap<Vec<u8>, (f64, Direction)>;
 
 fn add(aligned: &mut Aligned, frames: &[Frame]) {
@@ -128,7 +128,7 @@ fn add(aligned: &mut Aligned, frames: &[Frame]) {
 /// Frames of all files, merged by time.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// Frames in order of time. A frame of several files occurs once.
+    /// Frames in order of time. A frame that several files have occurs once.
     pub frames: Vec<Frame>,
     /// Relation of each file's clock to that of the first file.
     pub files: Vec<Alignment>,
@@ -147,7 +147,7 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
             one_chain(first, other)?;
         }
     }
-    // Its acts of the operator would count twice.
+    // Otherwise the operator's commands in the file would count twice.
     for (index, file) in files.iter().enumerate() {
         if let Some(before) = files.iter().take(index).find(|it| is_copy(it, file)) {
             return Err(format!(
@@ -178,7 +178,7 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     let mut span = [f64::INFINITY, f64::NEG_INFINITY];
     while alignments.contains(&None) {
         let waiting = alignments.iter().enumerate().filter(|(_, it)| it.is_none());
-        // After the first file always the one with the most frames in common with the aligned files.
+        // After the first file, the next one is always the file with the most frames in common with the aligned files.
         let counted = waiting.map(|(index, _)| {
             let frames = files.get(index).map_or(&[][..], |it| &it.frames);
             let own = once(frames);
@@ -212,7 +212,7 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     // A frame that several nodes captured, or that an attacker replayed, counts once.
     let mut known = std::collections::HashSet::new();
     retain(&mut frames, "", |it| known.insert(it.wire.clone()));
-    // A clock may still step after its last common frame.
+    // A clock may still have a step after the file's last common frame.
     if let Some(steps) = without_steps(&mut frames) {
         warnings.push(format!("the time of the flight jumps {steps}: corrected"));
     }
@@ -225,7 +225,8 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
 
 /// Removes steps of a file's clock: more than [`STEP`] backward or [`APART`] forward.
 ///
-/// Times before a step are shifted to the clock after the last step. Returns a description of the steps, if any.
+/// Times before a step are shifted as if the clock had been right from the start. Returns a description of the steps,
+/// if any.
 fn without_steps(frames: &mut [Frame]) -> Option<String> {
     let times: Vec<f64> = frames.iter().map(|frame| frame.at).collect();
     let pairs = times.iter().zip(times.iter().skip(1));
@@ -275,7 +276,7 @@ fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
     }
 }
 
-/// Returns true if the shorter recording is the beginning of the other one.
+/// Returns true if the shorter recording is the beginning of the longer one.
 fn is_copy(one: &Recording, other: &Recording) -> bool {
     one.frames
         .iter()
@@ -304,7 +305,7 @@ fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
 
 /// Returns the index of the frame with the largest change of time from the previous frame.
 ///
-/// Only frames after `from` and up to `to` count.
+/// Only frames with indices above `from` and up to `to` count.
 fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
     let change = |index: &usize| {
         let [one, other] =

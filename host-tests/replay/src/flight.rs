@@ -13,10 +13,10 @@ use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
 
 use crate::recording::Frame;
 
-/// Time between two computed snapshots, s. Alarms are raised after a few seconds, so it is fixed.
+/// Time between two computed snapshots, s. The time is fixed, because alarms are raised after a few seconds.
 const PERIOD: f64 = 0.5;
 
-/// Maximum number of stored snapshots, without the last. Of a long flight every k-th one is stored.
+/// Maximum number of stored snapshots, not counting the last. In a long flight only every k-th snapshot is stored.
 const MOST: f64 = 7_200.0;
 
 /// Maximum time between two reported positions of a relay for an interpolation, s.
@@ -42,14 +42,14 @@ pub struct Loss {
     pub from: f64,
     /// Time of the first report after the silence, s; `None` if there is no later report.
     pub until: Option<f64>,
-    /// True if another relay has reported it as lost.
+    /// True if any other relay has reported the silent relay as lost.
     pub is_reported: bool,
 }
 
 impl Loss {
     /// Returns true if this silence is a part of `all`, a silence of all relays.
     ///
-    /// It may begin up to 5 s earlier and end up to 5 s later.
+    /// The part may begin up to 5 s earlier than `all`, and end up to 5 s later.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all
@@ -64,7 +64,7 @@ impl Loss {
 pub struct Nearest {
     /// Smallest distance in the flight, m.
     pub distance_m: f64,
-    /// Numbers of these two relays.
+    /// Node numbers of the two relays.
     pub relays: [u16; 2],
     /// Time of the closest approach, s.
     pub time_s: f64,
@@ -77,7 +77,7 @@ pub struct Flight {
     pub begin: f64,
     /// Duration of the flight, s.
     pub duration: f64,
-    /// Time between two stored snapshots, s. The last snapshot is the end of the flight.
+    /// Time between two stored snapshots, s. The last snapshot is taken at the end of the flight.
     pub period: f64,
     /// Stored snapshots as JSON, each one as its changes.
     pub steps: Vec<Value>,
@@ -91,14 +91,14 @@ pub struct Flight {
     pub relays: u16,
     /// Time of the first agreement, s, and two fractions of the time since then.
     ///
-    /// The first one is with agreed positions of all relays. The second one is with those of all members of the last
-    /// view.
+    /// First the fraction in which all relays have agreed positions, then the fraction in which all members of the last
+    /// view have.
     pub available: Option<(f64, [f64; 2])>,
     /// Lowest SIR of any hop since the previous stored snapshot, dB; `None` if unknown.
     pub worst_db: Vec<Option<f64>>,
     /// Periods in which relays sent no reports.
     pub losses: Vec<Loss>,
-    /// Agreed views (memberships of the chain): time, number, and number of relays.
+    /// Agreed views (memberships of the chain): time, s, view number, and number of relays.
     pub views: Vec<(f64, u32, u16)>,
     /// Closest approach of two relays in the air, if two were in the air at once.
     pub nearest: Option<Nearest>,
@@ -110,7 +110,7 @@ pub fn largest(frames: &[Frame]) -> u16 {
     entries.map(|(entry, ..)| entry.relay()).max().unwrap_or(0)
 }
 
-/// Returns the entries (states of relays) of a report message; the first has the detail, if any.
+/// Returns the entries (states of relays) of a report message; the first entry has the detail, if any.
 fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
     let report = match &frame.message {
         Some(Message::Report(report)) => Some(report),
@@ -215,7 +215,7 @@ impl Flight {
     }
 }
 
-/// Returns the states of all relays in order of time: the frame's time minus the entry's age.
+/// Returns the states of all relays in order of time. The time is that of the frame minus the entry's age.
 fn reports(frames: &[Frame], begin: f64, relays: u16) -> Vec<Report> {
     let mut all: Vec<_> = frames
         .iter()
@@ -260,7 +260,7 @@ struct Recorder<'a> {
     tracks: BTreeMap<u16, Vec<(f64, Placement)>>,
     /// Lowest SIR since the last stored snapshot, dB; `None` if unknown.
     worst_db: Option<f64>,
-    /// Present silences, by relay number.
+    /// Silences that have not ended yet, by relay number.
     open: BTreeMap<u16, Loss>,
     /// Last time at which no relay reported.
     silent_at: Instant,
@@ -351,7 +351,7 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Repeats and logs the acts of the operator that a frame's comment names.
+    /// Repeats and logs the operator's commands that a frame's comment names.
     fn act(&mut self, flight: &mut Flight, now: f64, frame: &Frame) {
         let acts = frame.comment.split("; ");
         for act in acts.filter_map(|it| it.strip_prefix("operator: ")) {
@@ -402,7 +402,7 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Updates the chain's availability and the silences by `snapshot`, the state at `now`.
+    /// Updates the chain's availability and the silences from `snapshot`, the state at `now`.
     ///
     /// The availability is the fraction of time with agreed positions.
     fn losses(&mut self, flight: &mut Flight, now: f64, snapshot: &Snapshot) {
@@ -458,7 +458,7 @@ impl<'a> Recorder<'a> {
 
     /// Updates the closest approach by the distances between all relays.
     ///
-    /// With `only` just the distances of this relay are computed.
+    /// If `only` is given, only the distances of that relay are computed.
     fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places
@@ -491,7 +491,7 @@ impl<'a> Recorder<'a> {
 
     fn finish(self, flight: &mut Flight) {
         flight.losses.extend(self.open.into_values());
-        // When all relays fall silent, some are silent earlier, and some report again later.
+        // When all relays fall silent, some of them begin earlier, and some report again later.
         let outages = flight.losses.iter().filter(|it| it.relay == 0);
         let outages: Vec<Loss> = outages.cloned().collect();
         flight
@@ -522,7 +522,7 @@ fn replayed(text: String) -> String {
 
 /// Returns the position of a relay at `now`, interpolated between two reports.
 ///
-/// `None` if they are more than [`GAP`] apart.
+/// `None` if the time between the two exceeds [`GAP`].
 fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     let after = track.partition_point(|(at, _)| *at < now);
     let (t0, one) = track.get(after.checked_sub(1)?)?;
@@ -576,7 +576,7 @@ fn round(value: &mut Value) {
 
 /// Returns the changes from `old` to `new` for the page; `None` without changes.
 ///
-/// For an object or array it has the changed values by key or index. The key `#` is an array's new length.
+/// For an object or array, the result has the changed values by key or index. The key `#` is an array's new length.
 fn difference(old: &Value, new: &Value) -> Option<Value> {
     let mut changes = serde_json::Map::new();
     match (old, new) {

@@ -36,9 +36,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Checks that the page replaces neither an input file nor another capture.
+/// Checks that the page replaces neither an input file nor any other capture.
 fn check_out(options: &Options) -> Result<(), String> {
-    // A missing file has no such path.
+    // A file that does not exist has no canonical path.
     let Ok(path) = options.out.canonicalize() else {
         return Ok(());
     };

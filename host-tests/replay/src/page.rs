@@ -14,7 +14,7 @@ const SCRIPT: &str = include_str!("../web/replay.js");
 const STYLE: &str = include_str!("../web/replay.css");
 const BAR: &str = include_str!("../web/bar.html");
 
-/// Width and height of the chart, its left and its bottom margin, px.
+/// Width and height of the chart, and its left and bottom margins, px.
 const CHART: [f64; 4] = [1000.0, 180.0, 44.0, 22.0];
 
 /// Returns the page of a flight as a single HTML document that loads no other files.

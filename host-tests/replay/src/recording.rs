@@ -14,7 +14,7 @@ use uav_relay_decode::source::{Item, Packet, SourceError, read};
 /// Intact frame of a capture.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time of the frame, s since 1970: by its own file's clock, after a merge by the first file's clock.
+    /// Time of the frame, s since 1970: by its own file's clock, but after a merge by the first file's.
     pub at: f64,
     /// Direction of the frame, seen from the node that wrote the file.
     pub direction: Direction,
@@ -22,13 +22,13 @@ pub struct Frame {
     pub wire: Vec<u8>,
     /// Network, sender, destination and counter of the frame.
     pub header: Header,
-    /// Message of the frame; `None` for a handshake, and if no relay accepts it.
+    /// Message of the frame; `None` for a handshake, and for a message that no relay would accept.
     pub message: Option<Message>,
-    /// Comment on the frame and on omitted packets before it: acts of the operator. Empty for none.
+    /// Comment on the frame and on omitted packets before it: the operator's commands. Empty for none.
     pub comment: String,
 }
 
-/// Adds `more` to a comment.
+/// Appends `more` to a comment.
 fn join(comment: &mut String, more: &str) {
     if !comment.is_empty() && !more.is_empty() {
         comment.push_str("; ");
@@ -67,7 +67,7 @@ pub struct Recording {
     pub network: u16,
     /// Digest of the mission loaded before flight, if a frame has it.
     pub mission: Option<u16>,
-    /// Fault after the last readable frame, if any.
+    /// Fault of the file after its last readable frame, if any.
     pub fault: Option<String>,
 }
 
@@ -86,13 +86,13 @@ impl Recording {
             if let Item::Packet(packet) = item {
                 all += 1;
                 is_stream |= packet.at.is_none();
-                // A packet without an intact frame may also have an act of the operator.
+                // A packet without an intact frame may also have a comment with an operator's command.
                 join(&mut acts, packet.comment);
                 if let Some(frame) = frame(&packet) {
                     let comment = std::mem::take(&mut acts);
                     frames.push(Frame { comment, ..frame });
                 }
-                // Without times a long file is not read to its end.
+                // If the file has no times, it is not read to its end.
                 return if is_stream { Err(()) } else { Ok(()) };
             }
             Ok(())

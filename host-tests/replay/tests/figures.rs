@@ -45,7 +45,8 @@ fn report(at: f64, relay: u16, x_m: f32) -> Frame {
 
 #[test]
 fn outages_of_a_long_flight_are_alarms_and_losses() {
-    // Relay 2 is lost at 5000 s. All relays are silent from 9000 to 9060 s, relay 1 from three seconds earlier.
+    // Relay 2 is lost at 5000 s. All relays are silent from 9000 to 9060 s, and relay 1 falls silent three seconds
+    // earlier.
     let mut frames = Vec::new();
     for second in 0..10_800 {
         let is_out = |from: i32| (from..9_060).contains(&second);
@@ -63,7 +64,7 @@ fn outages_of_a_long_flight_are_alarms_and_losses() {
             .unwrap_or_else(|| panic!("{:?}", flight.alarms))
             .time_s
     };
-    // Before an agreement reports may be slow.
+    // Before the first agreement, reports may be less frequent.
     let begin_s = begins("relay 2");
     assert!((begin_s - 5_010.0).abs() < 1.0, "{begin_s}");
     assert!((begins("no report of any relay for 59 s") - 9_005.0).abs() < 1.0);
@@ -80,7 +81,7 @@ fn outages_of_a_long_flight_are_alarms_and_losses() {
     );
 }
 
-/// Checks that a relay cleared by the operator disappears until it reports again.
+/// Checks that a relay that the operator has reported as landed disappears until it reports again.
 #[test]
 fn a_relay_that_the_operator_cleared_is_gone_until_it_reports_again() {
     let flown = |end: i32| {
@@ -94,7 +95,7 @@ fn a_relay_that_the_operator_cleared_is_gone_until_it_reports_again() {
         }
         for frame in &mut frames {
             let acts = match (frame.at, frame.header.sender) {
-                // Relay 3 is not lost, so this act is only logged.
+                // Relay 3 is not lost, so this command is only logged.
                 (15.0, 1) => "operator: clear-lost 3 by the page; operator: upload 1 by the page",
                 (60.0, 3) => "operator: clear-lost 2 by the page at 127.0.0.1",
                 _ => continue,
@@ -144,14 +145,14 @@ fn a_relay_that_the_operator_cleared_is_gone_until_it_reports_again() {
     assert!((acts[2].time_s - 60.0).abs() < 1.0);
 }
 
-/// Checks that no act of the operator is lost or moved far, even if its frame is repeated.
+/// Checks that no operator's command is lost or moved far in time, even if its frame is repeated.
 #[test]
 fn acts_of_the_operator_stay_at_their_time_and_are_all_kept() {
     let seconds = || (0..100).map(f64::from);
     let mut station = recording(1, seconds());
     let mut other = recording(1, seconds().map(|at| at + 0.01));
     other.frames[30].at += 0.02;
-    // Two copies of the frame at second 10 have an act. The second copy is the last frame.
+    // Two copies of the frame at second 10 have a command. The second copy is the last frame.
     let mut repeated = station.frames[10].clone();
     repeated.at = 60.5;
     "operator: clear-lost 3 by one".clone_into(&mut repeated.comment);
@@ -160,7 +161,7 @@ fn acts_of_the_operator_stay_at_their_time_and_are_all_kept() {
     late.at = 99.5;
     "operator: clear-lost 4 by one".clone_into(&mut late.comment);
     station.frames.push(late);
-    // Both stations have an act at the same frame.
+    // Both stations have a command at the same frame.
     "operator: upload 1 by one".clone_into(&mut station.frames[30].comment);
     "operator: upload 2 by other".clone_into(&mut other.frames[30].comment);
     let merged = clocks::merge(vec![station, other]).unwrap();
@@ -208,7 +209,7 @@ fn recording(relay: u16, times: impl Iterator<Item = f64>) -> Recording {
 
 #[test]
 fn steps_of_the_first_clock_are_left_out_with_a_warning() {
-    // Its clock starts in 1970, is set to the time at second 60, and back by 5 s at second 90.
+    // The file's clock starts in 1970, is set to the right time at second 60, and goes back by 5 s at second 90.
     let seconds = (0..120).map(f64::from);
     let clock = seconds.map(|at| match at {
         ..60.0 => at,

@@ -102,7 +102,7 @@ impl Clock {
 
 /// Writes the frames that `node` has sent and received to a capture, with the times of `clock`.
 ///
-/// The node is switched off at `end_s`. From second 70 to 71.5 it receives nothing, so that no frame connects the
+/// The node is switched off at `end_s`. From second 70 to 71.5 the node receives nothing, so that no frame connects the
 /// clocks just after a step.
 fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) -> PathBuf {
     let path = folder.join(format!("node{node}.pcapng"));
@@ -121,7 +121,7 @@ fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) ->
         let (time, direction) = if sender == node {
             (end - frame.bytes.len() as f64 / 5_760.0, Direction::Out)
         } else if frame.note.is_empty() && !(70.0..71.5).contains(&end) {
-            // A program reads up to 8 ms after the last byte.
+            // A program reads a frame up to 8 ms after its last byte.
             let late = LATENCY_MS as f64 + (number * 7 % 9) as f64;
             (end + late / 1e3, Direction::In)
         } else {
@@ -153,7 +153,7 @@ fn sender(wire: &[u8]) -> u16 {
 
 const EPOCH: f64 = 1.8e9;
 
-/// Checks that an act on a damaged packet goes to the next frame, or at the end to the last one.
+/// Checks that a command at a damaged packet moves to the next frame, or at the end to the last one.
 #[test]
 fn an_act_on_a_damaged_packet_is_kept() {
     let flown = fly(2, false, 10, None);
@@ -286,14 +286,14 @@ fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
         std::fs::write(&path, bytes).unwrap();
         path
     };
-    // The interface has another link type.
+    // The link type of the interface is changed to a wrong one.
     let mut ethernet = whole.clone();
     let at = ethernet
         .windows(4)
         .position(|it| it == [147, 0, 0, 0])
         .unwrap();
     ethernet[at] = 1;
-    // A fault in the middle of each frame.
+    // The capture gets a fault in the middle of each frame.
     let mut noise = Capture::new(Vec::new(), "", "").unwrap();
     let port = noise.interface("", "").unwrap();
     for frame in &flown.frames {
@@ -365,7 +365,7 @@ fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
         error.contains("other.toml: its mission of 3 relays is not the one"),
         "{error}"
     );
-    // A companion that lost its power: the frames until then are used.
+    // A companion has lost its power. Its frames until then are used.
     let cut = write("lost_power.pcapng", &whole[..whole.len() / 2]);
     let shown = replay(&[files[0].clone(), cut, files[2].clone()], None).unwrap();
     assert!(

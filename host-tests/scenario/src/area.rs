@@ -21,7 +21,7 @@ pub enum Area {
 
 /// Area of an interferer whose exact position and power are unknown.
 ///
-/// The entry in [`Interference`](crate::Interference) has the interferer's greatest power, and the middle of the area
+/// The interferer's entry in [`Interference`](crate::Interference) has its greatest power, and the middle of the area
 /// as its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceArea {
@@ -38,7 +38,7 @@ pub struct NoFly {
     pub key: String,
     /// Corners of the boundary, [x, y], m. A circle in the file is replaced by a polygon around it.
     pub corners: Vec<[f64; 2]>,
-    /// Lowest and highest altitude of the no-fly area, m, measured like `geometry.altitude_m`.
+    /// Lowest and highest altitude of the no-fly area, m, with the reference of `geometry.altitude_m`.
     pub altitudes_m: RangeInclusive<f64>,
 }
 
@@ -92,7 +92,7 @@ impl Area {
             Self::Circle { centre, .. } => return *centre,
             Self::Polygon(corners) => corners,
         };
-        // Coordinates relative to a corner: large coordinates would lose digits.
+        // Coordinates are taken relative to a corner, because large coordinates would lose digits.
         let [x, y] = corners.first().copied().unwrap_or_default();
         let (mut area, mut sum) = (0.0, [0.0; 2]);
         for [a, b] in edges(corners) {
@@ -183,7 +183,8 @@ impl Area {
 impl NoFly {
     /// Returns how deep a relay is inside the no-fly area, m; `None` if it is outside.
     ///
-    /// The depth is the smallest distance to the boundary, the lowest altitude and the highest altitude.
+    /// The depth is the smallest of three distances: to the boundary, to the lowest altitude and to the highest
+    /// altitude.
     pub fn depth_m(&self, at: [f64; 2], altitude_m: f64) -> Option<f64> {
         if !(self.altitudes_m.contains(&altitude_m) && is_inside(&self.corners, at)) {
             return None;
@@ -199,7 +200,7 @@ impl NoFly {
 
     /// Returns the intervals of x, m, in which a relay is inside the no-fly area or close to it.
     ///
-    /// The relay flies at `y_m` and `altitude_m`. Its position may be wrong by up to `around_m` in x, y and altitude.
+    /// The relay flies at `y_m` and `altitude_m`. Close means within `around_m`, m, in x, y and altitude.
     pub fn intervals_m(&self, y_m: f64, altitude_m: f64, around_m: f64) -> Vec<[f64; 2]> {
         let around_m = around_m.max(1e-6);
         let [lowest, highest] = [self.altitudes_m.start(), self.altitudes_m.end()];
@@ -268,7 +269,7 @@ fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> {
     corners.iter().zip(next).map(|(from, to)| [*from, *to])
 }
 
-/// Returns true if the point `at` is inside the polygon: a ray from it crosses an odd number of edges.
+/// Returns true if `at` is inside the polygon, so that a ray from it crosses an odd number of edges.
 fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
     let crossed = edges(corners).filter(|[a, b]| {
         (a[1] > at[1]) != (b[1] > at[1])
@@ -279,7 +280,7 @@ fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
 
 /// Returns twice the signed area of the triangle a, b, c.
 ///
-/// Points c on opposite sides of the line a-b give opposite signs.
+/// Two points c on opposite sides of the line a-b give opposite signs.
 fn turn([a, b]: [[f64; 2]; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
@@ -300,7 +301,7 @@ fn cross(one: [[f64; 2]; 2], other: [[f64; 2]; 2]) -> bool {
 
 /// Returns true if the second edge runs back along the first edge.
 ///
-/// The second edge begins where the first edge ends.
+/// The second edge must begin where the first edge ends.
 fn is_spike(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> bool {
     let [[a, b], [_, c]] = [first, second];
     let back = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);

@@ -52,7 +52,7 @@ impl Check<'_> {
         if let Some((name, value)) = table.iter().find(|(name, _)| !is_known(name)) {
             let meant = nearest(name, keys.clone());
             let allowed = format!("the keys {}{meant}", names(keys));
-            // The name is from the file, and may be as long as the file.
+            // The name comes from the file, so it may be as long as the file.
             let path = join(path, &cut(name));
             return Err(mistake(
                 self.file,
@@ -265,7 +265,7 @@ fn as_number(value: &Value) -> Option<f64> {
 
 /// Creates the error for a table that [`table`] accepts, but serde rejects.
 ///
-/// This error is a bug of the crate: the table of keys and the Rust types differ.
+/// Such an error is a bug of this crate: the table of keys contradicts the Rust types.
 pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),
@@ -278,7 +278,7 @@ pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> Scenario
 
 /// Largest size of a scenario file, bytes.
 ///
-/// It stops the reading of endless files such as `/dev/zero`.
+/// The limit ends the reading of endless files such as `/dev/zero`.
 const LONGEST: u64 = 1 << 20;
 
 pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {
@@ -343,7 +343,8 @@ pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
     Ok(table)
 }
 
-/// Returns the line and column (from 1, in characters) of a byte offset, and the text of that line.
+/// Returns line and column of a byte offset, both counted from 1, and the text of that line. ¶ The column is in
+/// characters.
 fn place(text: &str, byte: usize) -> (usize, usize, &str) {
     let before = text.get(..byte).unwrap_or(text);
     let start = before.rfind('\n').map_or(0, |newline| newline + 1);

@@ -15,7 +15,7 @@ use crate::error::{Problem, ScenarioError};
 /// Default network number of all tools. Relays ignore frames with another network number.
 pub const NETWORK: u16 = 1;
 
-/// Relative tolerance of the target SIR on companion computers. It cannot be set.
+/// Relative tolerance of the target SIR on companion computers. No option changes it.
 pub const COMPANION_TOLERANCE: f64 = 1e-4;
 
 /// Settings of the programs: sections `[network]`, `[companion]` and `[ground]` of a scenario file.
@@ -89,7 +89,7 @@ pub struct Companion {
     pub descent_m_s: Option<f32>,
     /// True if the relay is a spare: it waits outside of the chain until the leader calls it.
     pub spare: Option<bool>,
-    /// FIFO with the drone's position, which another program writes.
+    /// FIFO to which a different program writes the drone's position.
     pub positions: Option<PathBuf>,
     /// Largest position error of a hovering drone, m, 0 to 1000.
     pub position_error_m: Option<f32>,
@@ -117,7 +117,7 @@ pub struct Ground {
     pub epoch_file: Option<PathBuf>,
     /// Time after which the ground station gives up an upload, s, 1 to 86400.
     pub timeout_s: Option<u32>,
-    /// True if the ground station continues to run after an upload; false if it ends then.
+    /// True if the ground station continues to run after an upload; false if it exits then.
     pub stand: Option<bool>,
     /// Source of interference measurements: a FIFO, a file, or `udp:[HOST:]PORT`.
     pub measurements: Option<String>,

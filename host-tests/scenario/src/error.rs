@@ -14,7 +14,7 @@ const QUOTED: usize = 60;
 pub struct ScenarioError {
     /// Name of the scenario file, as given by the user.
     pub file: String,
-    /// Location: a key such as `relay[1].index`, or a line and column. `None` if the whole file is at fault.
+    /// Location: a key such as `relay[1].index`, or a line and column. `None` if the mistake concerns the whole file.
     pub key: Option<String>,
     /// Wrong value as TOML, cut if it is long; `None` if the mistake is not in a value.
     pub value: Option<String>,
@@ -50,7 +50,7 @@ pub enum Problem {
     SaidTwice,
     /// A position in latitude and longitude is given, but the table `[site]` that it needs is missing.
     NoSite,
-    /// The value of a key is a text outside the list of allowed texts.
+    /// The value of a key is a text that is none of the allowed texts.
     UnknownChoice,
     /// The UDP address of an autopilot is malformed.
     NoEndpoint(EndpointError),
@@ -64,11 +64,11 @@ pub enum Problem {
     WrongType,
     /// The value of a key is outside its range, is NaN or infinite, or is an empty text.
     OutOfRange,
-    /// The value of a key is an empty list, although it needs an entry.
+    /// The value of a key is an empty list, although it needs at least one entry.
     EmptyList,
     /// `[field]` and `[[interferer]]` are both given, although they exclude each other.
     TwoInterferences,
-    /// `[listen]` and `[field]` are both given: relays cannot locate an interferer in a random field.
+    /// `[listen]` and `[field]` are both given: a random field has no interferer to locate.
     MeasuredField,
     /// Neither `[field]` nor `[[interferer]]` is given.
     NoInterference,
@@ -84,7 +84,7 @@ pub enum Problem {
     ContainsSite,
     /// A range of powers is given for an interferer without an area.
     NeedsArea,
-    /// The boundary of an area crosses itself, or has no surface.
+    /// The boundary of an area crosses itself, or encloses no surface.
     NoArea,
     /// The bandwidths in `[link]` and in `[noise]` differ.
     OtherBandwidth,

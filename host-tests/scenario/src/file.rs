@@ -86,7 +86,7 @@ enum RawPowers {
 }
 
 impl RawPowers {
-    /// Returns the least power (`end` 0) or the greatest power (`end` 1).
+    /// Returns the least power if `end` is 0, the greatest power if `end` is 1.
     fn end(self, end: usize) -> f64 {
         match self {
             Self::One(one) => one,
@@ -426,7 +426,7 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
     if nlos >= los {
         return Ok(spec);
     }
-    // The error names a key that is in the file.
+    // The error must name a key that the file has.
     let (key, value, allowed) = match raw.excess_loss_nlos_db {
         Some(_) => (
             "channel.excess_loss_nlos_db",
@@ -567,7 +567,7 @@ fn relays(
     Ok(relays)
 }
 
-/// Converts the `[plan]` table of a file. Returns an error unless it has one position for each of its relays.
+/// Converts the `[plan]` table of a file. Returns an error unless the table has one position for each of its relays.
 fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
     if raw.places.len() != usize::from(raw.uavs) {
         return Err(mistake(
@@ -641,7 +641,7 @@ pub(super) fn line(
 fn line_on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
     let geoid_m = sites.geoid_m;
     let sites @ [tx, rx] = [&sites.tx, &sites.rx].map(|site| {
-        // The check of the keys has accepted these ranges.
+        // The check of the keys has already accepted these ranges.
         Geodetic::from_degrees(site.lat_deg, site.lon_deg, site.amsl_m).unwrap_or_default()
     });
     let axis = Axis::try_new(tx, rx).map_err(|error| {
@@ -717,7 +717,7 @@ pub(super) struct GivenPower<'a> {
     pub(super) in_w: (&'a str, Option<f64>),
     pub(super) in_dbm: (&'a str, Option<f64>),
     pub(super) eirp: (&'a str, Option<f64>),
-    /// Antenna gain: the name of its key, and its value in dBi; `None` if it is not given.
+    /// Antenna gain: the name of its key, and its value in dBi; `None` if the file has no value.
     pub(super) gain: (&'a str, Option<f64>),
 }
 
@@ -795,8 +795,8 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
 
 /// Largest accepted error of the interference, dB, if an interferer's height is ignored.
 ///
-/// An interferer whose height causes a larger error is rejected. The error is checked at all positions that relays or
-/// Rx may have.
+/// An interferer whose ignored height causes a larger error is rejected. The error is checked at all positions that
+/// relays or Rx may have.
 const MAX_HEIGHT_ERROR_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -823,7 +823,7 @@ pub(super) struct RelayArea<'a> {
 }
 
 impl RawSource {
-    /// Returns the least EIRP (`end` 0) or the greatest EIRP (`end` 1), W.
+    /// Returns the least EIRP if `end` is 0, the greatest EIRP if `end` is 1; in W.
     fn eirp_w(&self, file: &str, table: &str, end: usize) -> Result<f64, ScenarioError> {
         let of = |powers: Option<RawPowers>| powers.map(|powers| powers.end(end));
         let said = GivenPower {
@@ -837,7 +837,8 @@ impl RawSource {
     }
 }
 
-/// Converts the areas of the `[[interferer]]` tables, by index. An area with Tx or Rx inside is an error.
+/// Converts the areas of the `[[interferer]]` tables, each with the index of its table. An area with Tx or Rx inside is
+/// an error.
 fn source_areas(
     file: &str,
     raw: &[RawSource],
@@ -976,7 +977,7 @@ fn near_line(
     })
 }
 
-/// Returns the part of an error message with the allowed positions. The given position is too far away.
+/// Returns the allowed positions, for the error message about a position that is too far away.
 fn far_from(line: &Line, [lat, lon]: [f64; 2]) -> String {
     let at = |lat, lon| Geodetic::from_degrees(lat, lon, 0.0);
     let away_m = at(lat, lon).and_then(|point| line.axis.away_m(point));
@@ -1078,7 +1079,7 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
         let Some(kind) = value.get("type").and_then(|kind| kind.as_str()) else {
             return Err(fail("has an object without a type".to_owned()));
         };
-        // Relays would fly into a no-fly area that is ignored here.
+        // An area that is ignored here would be a no-fly area into which relays fly.
         let lacks = |part: &str| fail(format!("has a {kind} without {part}"));
         let list = |key: &str| {
             let list = value.get(key).and_then(|list| list.as_array());
@@ -1125,7 +1126,7 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
         let mut rings = rings.into_iter();
         let boundary = Area::Polygon(rings.next().unwrap_or_default());
         for (hole, corners) in (2..).zip(rings) {
-            // About a centimetre, in degrees: a hole may touch the boundary.
+            // The tolerance is about a centimetre, in degrees, because a hole may touch the boundary.
             if corners.iter().any(|at| boundary.distance_m(*at) > 1e-7) {
                 return Err(fail(format!(
                     "polygon {number}: ring {hole} is not inside ring 1, and the first ring has to be the outer boundary"
@@ -1180,8 +1181,8 @@ pub(super) fn sources(
 
 /// Converts an interferer's latitude and longitude to x and y, m.
 ///
-/// Errors: no `[site]` in the file, an interferer that is too far away, or a height that changes the interference too
-/// much.
+/// Returns an error if the file has no `[site]`, if the interferer is too far away, or if its height changes the
+/// interference too much.
 fn on_earth(
     file: &str,
     table: &str,
@@ -1244,7 +1245,7 @@ impl RelayArea<'_> {
     /// Returns the largest error of the interference, dB, if the interferer's height is ignored.
     ///
     /// The interferer is at (`x_m`, `y_m`) and `above_m` over the ground, m. The error is checked at Rx, and at 65
-    /// altitudes of the relay position nearest to the interferer: there it is largest.
+    /// altitudes above the relay position nearest to the interferer, where it is largest.
     fn height_error_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;
         let ratio_db = |beside_m: f64, h: f64| {

@@ -29,8 +29,8 @@ const REPORTED: usize = 60_000;
 
 /// Largest lateral distance y_H in the search, as a multiple of the scene's size.
 ///
-/// At this distance the interference at all relay positions is equal to a thousandth. The size of the scene is its
-/// largest extent in x, y or altitude.
+/// At this distance the interference is the same at all relay positions, within a thousandth. The size of the scene is
+/// its largest extent in x, y or altitude.
 const FAR: f64 = 30.0;
 
 /// Grid step of the search in u = asinh(y_H / lowest altitude).
@@ -40,12 +40,12 @@ const RISE: f64 = 0.35;
 
 /// Largest number of local searches that start at minima of the grid.
 ///
-/// As many further searches start at true interferers.
+/// The same number of further searches starts at true interferers.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
 
-/// A hypothetical interferer that replaces all interferers of a scene, and the error that it causes.
+/// A hypothetical interferer that replaces all interferers of a scene, and its interference error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothetical {
     /// Transmit power of the hypothetical interferer (p_H), W, > 0.
@@ -86,7 +86,7 @@ impl Hypothetical {
                 h,
             })
             .collect();
-        // Ratios, not differences: otherwise the positions near an interferer would dominate.
+        // The error is a sum over ratios, because with differences the positions near an interferer would dominate.
         let error = |one: &Self| -> f64 {
             let each = places.iter().map(|at| {
                 let (dx, dy) = (at.x - one.x_m, at.y - one.y_m);
@@ -112,7 +112,7 @@ impl Hypothetical {
     }
 }
 
-/// Best position and power of the hypothetical interferer for the points of a [`Raster`].
+/// Position and power of the hypothetical interferer with the least error at a [`Raster`]'s points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Position x_H of the hypothetical interferer along the line from Tx, m.
@@ -125,8 +125,8 @@ pub struct Fit {
 
 /// Returns the single interferer that best replaces all interferers of `scene`; `None` if it has none.
 ///
-/// The search usually evaluates about 1 500 positions with 400 quadrature points, 600 with 4 000 and one with 60 000.
-/// The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in
+/// The search usually evaluates about 1 500 positions with 400 quadrature points each, 600 positions with 4 000, and
+/// one with 60 000. The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in
 /// `host-tests/tests/multi_interferer`).
 pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     let found = fit(scene, &Raster::graded(scene, None, FINE))?;
@@ -161,7 +161,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
         .take(FINALISTS)
         .map(|corner| space.descend(raster, corner.at, 0.2, 1e-6, 40))
         .min_by(|a, b| a.value.total_cmp(&b.value))?;
-    // A new simplex, because a simplex that has collapsed to a line stays on this line.
+    // The search restarts with a new simplex, because a simplex that has collapsed to a line stays on this line.
     let close = space.descend(raster, near.at, 0.05, 1e-9, 80);
     let best = space.descend(raster, close.at, 0.01, 1e-12, 80);
     let (x_m, y_m) = space.place(best.at);
@@ -174,7 +174,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
 
 /// Returns the points (x, u) of the search space at which the local searches start.
 ///
-/// These are the deepest local minima of a grid, and the true interferers with the smallest errors.
+/// The points are the deepest local minima of a grid, and the true interferers with the smallest errors.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -300,7 +300,7 @@ impl Space {
     ) -> Corner {
         let (x, y) = self.place(start);
         let dx = share * 0.5 * y.hypot(self.unit).min(0.1 * self.distance_m);
-        // Steps inwards, because a step across the border has no effect.
+        // The steps point into the search space, because a step across its border has no effect.
         let dx = if x + dx > self.high { -dx } else { dx };
         let du = share * RISE;
         let du = if start.1 + du > self.most_u { -du } else { du };
@@ -314,7 +314,7 @@ impl Space {
     }
 }
 
-/// Largest width of a quadrature cell, as a fraction of the distance to the nearest interferer.
+/// Largest width of a quadrature cell, as a fraction of its distance from the nearest interferer.
 const WIDEST_STEP: f64 = 0.9;
 
 const TRIES: u32 = 6;
@@ -384,7 +384,7 @@ impl Raster {
             .map(|source| (source.x_m, source.y_m.abs()))
             .chain(also)
             .collect();
-        // The number of points grows with 1 / step^2 over an area, with 1 / step along a line.
+        // The number of points is proportional to 1 / step^2 over an area, and to 1 / step along a line.
         let is_area = scene.band.most_m > scene.band.least_m;
         let mut step = WIDEST_STEP;
         let mut raster = Self::with_step(scene, &sharp, step);
@@ -578,7 +578,7 @@ pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -
             .iter()
             .map(|centre| step * centre.scale(at))
             .fold(widest, f64::min);
-        // A remainder of less than half a cell is added to the last cell.
+        // If less than half a cell remains, it is added to the last cell.
         at = if at + 1.5 * width < high {
             at + width
         } else {
@@ -649,7 +649,7 @@ fn minimise(
 
 /// Returns the point at the fraction `share` of the way from `from` to `to`.
 ///
-/// Above 1 the point is beyond `to`.
+/// With `share` above 1 the point is beyond `to`.
 fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
     (
         from.0 + share * (to.0 - from.0),
@@ -680,7 +680,7 @@ mod tests {
         close(median(&[]), 0.0);
     }
 
-    /// Checks that the simplex method finds a narrow minimum although the first simplex is much wider.
+    /// Checks that the simplex method finds a minimum that is much narrower than the first simplex.
     #[test]
     fn a_simplex_that_is_too_large_shrinks() {
         let pit = |(x, y): (f64, f64)| {

@@ -37,7 +37,7 @@ fn read(option: &str, file: &Path) -> Result<String, String> {
 
 /// Rejects a key file that users other than its owner and group can read or write.
 ///
-/// A missing or unreadable file is accepted here; reading it fails later.
+/// A missing or unreadable file is accepted here, because a later read of it fails.
 #[cfg(unix)]
 fn check_mode(file: &Path) -> Result<(), String> {
     use std::os::unix::fs::PermissionsExt as _;
@@ -54,7 +54,7 @@ fn check_mode(file: &Path) -> Result<(), String> {
     }
 }
 
-/// Accepts any key file: other systems than Unix have no file mode to check.
+/// Accepts any key file, because systems other than Unix have no file mode to check.
 #[cfg(not(unix))]
 fn check_mode(_: &Path) -> Result<(), String> {
     Ok(())
@@ -63,7 +63,7 @@ fn check_mode(_: &Path) -> Result<(), String> {
 /// Parses a secret key from 64 hexadecimal digits; white space around them is ignored.
 ///
 /// # Errors
-/// The problem: other characters, another length, or a key of zeros.
+/// The problem: a character that is no digit, a wrong length, or a key of zeros.
 pub fn parse(text: &str) -> Result<[u8; 32], &'static str> {
     let text = text.trim();
     if !text.bytes().all(|digit| digit.is_ascii_hexdigit()) {

@@ -11,7 +11,7 @@ use super::endpoint::FORM;
 use super::link::Access;
 use super::spec::PlannedMethod;
 
-/// Range of a number in a scenario file. Both ends are included; the low end is excluded if `open` is true.
+/// Range of a number in a scenario file. Both ends belong to the range, except the low end if `open` is true.
 pub(super) struct Range {
     low: f64,
     high: f64,
@@ -25,11 +25,11 @@ pub(super) enum Rule {
     /// Text "los" (line of sight) or "nlos" (obstructed), or a number within this range.
     LinkOrNumber(Range),
     Flag,
-    /// A number within this range, or a list of two: the least and the greatest.
+    /// A number within this range, or a list of two numbers: the least and the greatest.
     NumberOrTwo(Range),
     /// List with one number for each of these ranges.
     Numbers(&'static [Range]),
-    /// List of points, each with one number for each range. The pair has the least and greatest number of points.
+    /// List of points, each with one number for each range. The pair limits the number of points: least and greatest.
     Points(&'static [Range], [usize; 2]),
     Choice(&'static [&'static str]),
     Text,
@@ -46,7 +46,7 @@ pub(super) enum Rule {
 pub(super) enum Need {
     Always,
     Never,
-    /// Required if the table has none of these other keys.
+    /// The key is required if the table has none of these other keys.
     Unless(&'static [&'static str]),
 }
 
@@ -96,7 +96,8 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Creates a key that is required if the table has none of the keys `others`. It excludes all of them.
+/// Creates a key that is required if the table has none of the keys `others`. It must not be given together with any of
+/// them.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),
@@ -104,7 +105,7 @@ const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule)
     }
 }
 
-/// Creates an optional key that excludes the keys `others`.
+/// Creates an optional key that must not be given together with any of the keys `others`.
 const fn without(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         name,
@@ -266,7 +267,7 @@ const XY: &[Range] = &[PLACE, PLACE];
 const ON_EARTH: &[Range] = &[LATITUDE, LONGITUDE];
 const RADIUS: Range = range(1.0, 1e6, "m");
 
-// Each kind of area excludes the kinds that follow it.
+// A kind of area must not be given together with a kind that follows it.
 const AREA: Keys = &[
     unless(
         &[
@@ -337,7 +338,7 @@ impl Key {
         }
     }
 
-    /// Returns the keys among `keys` that the table may have in place of this required key.
+    /// Returns those of `keys` that the table may have in place of this required key.
     pub(super) fn alternatives(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,
@@ -422,7 +423,7 @@ impl fmt::Display for Rule {
 
 /// Returns the names of all keys of a scenario file, as `table.key`.
 ///
-/// A list of tables counts as one table.
+/// The keys of a list of tables appear once.
 pub fn all() -> Vec<String> {
     let mut names = Vec::new();
     collect("", FILE, &mut names);

@@ -36,7 +36,7 @@ pub enum Access {
     Slots,
     /// A frequency for each hop. All hops send at the same time.
     Channels,
-    /// A single frequency for all hops. Each hop's time slot is as long as the hop needs for the same amount of data.
+    /// A single frequency for all hops. The time slots are as long as each hop needs for the same amount of data.
     Fitted,
 }
 
@@ -55,7 +55,7 @@ impl Access {
 
     /// Returns the number of time slots in which each hop sends once, in each direction if `both_ways`.
     ///
-    /// It is 1 per direction if every hop has its own frequency, because all hops then send at once.
+    /// With a frequency for each hop it is 1 per direction, because all hops send at once.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
@@ -85,7 +85,8 @@ pub enum RateModel {
     },
     /// Table of modulation and coding schemes. SINR and spectral efficiency increase strictly.
     ///
-    /// A hop uses the last scheme whose SINR it reaches. Below the first SINR its spectral efficiency is 0.
+    /// A hop uses the last scheme in the table whose SINR it reaches. Below the first SINR its spectral efficiency is
+    /// 0.
     Steps(Vec<RateStep>),
 }
 
@@ -230,7 +231,7 @@ impl Radio {
 
     /// Returns the data rates to Rx and back to Tx, bit/s, of a chain that sends in both directions.
     ///
-    /// `there` and `back` are the linear SIRs of the hops in these directions. `reverse` is the planned rate to Tx
+    /// `there` and `back` are the linear SIRs of the hops toward Rx and toward Tx. `reverse` is the planned rate to Tx
     /// divided by the rate to Rx. With fitted slots and `reverse` above 0, the returned rates have this ratio.
     /// Otherwise each direction has half of the time.
     pub fn both_bps(&self, there: &[f64], back: &[f64], reverse: f64) -> [f64; 2] {
@@ -317,7 +318,7 @@ mod tests {
             };
             radio.chain_bps(sirs)
         };
-        // Rates of 2, 0.5 and 2 Mbit/s.
+        // The rates of the three hops are 2, 0.5 and 2 Mbit/s.
         let sirs = [10.0, 1.0, 20.0];
         assert!((rate(Access::Slots, &sirs) - 5e5 / 3.0).abs() < 1e-6);
         assert!((rate(Access::Channels, &sirs) - 5e5).abs() < 1e-6);
@@ -350,7 +351,7 @@ mod tests {
             },
             bandwidth_hz: 1e6,
         };
-        // Rates of 2 and 2, back 0.5 and 2 Mbit/s.
+        // The rates of the two hops are 2 and 2 Mbit/s toward Rx, and 0.5 and 2 Mbit/s back.
         let (there, back) = ([10.0, 10.0], [1.0, 10.0]);
         let is = |access, reverse, expected: [f64; 2]| {
             let found = radio(access).both_bps(&there, &back, reverse);
@@ -365,7 +366,7 @@ mod tests {
             is(Access::Channels, reverse, [1e6, 2.5e5]);
         }
         is(Access::Fitted, 0.0, [5e5, 2e5]);
-        // One Mbit to Rx takes 1 s, half a Mbit back 1.25 s.
+        // One Mbit takes 1 s to Rx, and half a Mbit takes 1.25 s back to Tx.
         is(Access::Fitted, 0.5, [1e6 / 2.25, 0.5e6 / 2.25]);
         assert!((worse_bps([4.0, 1.0], 0.5) - 2.0).abs() < 1e-12);
         assert!((worse_bps([4.0, 1.0], 0.0) - 4.0).abs() < 1e-12);

@@ -25,7 +25,7 @@ pub enum Refusal {
     NoHypothetical,
     /// The distance from Tx to Rx is too short for the number of relays at their minimum separation.
     NoRoom {
-        /// Number of relays that are too many for the distance.
+        /// Number of relays in the mission.
         relays: u16,
         /// Minimum separation of two relays, m.
         apart_m: f32,
@@ -218,7 +218,7 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
 
 /// Returns `mission` with the same interference at every x, for the time before any measurement.
 ///
-/// The mean of 1 / I at Rx is used at every x; I is the interference. A mission without a random field is unchanged.
+/// At every x the mean of 1 / I is that at Rx, for the interference I. A mission without a random field is unchanged.
 #[must_use]
 pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();
@@ -244,7 +244,7 @@ pub fn with_uniform_field(mission: &Mission) -> Mission {
 
 /// Returns alpha and beta of the Beta distribution of I / `i_max_w` at `x_m`; I is the interference.
 ///
-/// Between two points of the field, alpha and the mean of `i_max_w` / I are interpolated. They determine beta.
+/// Between two points of the field, alpha and the mean of `i_max_w` / I are interpolated. From the two follows beta.
 pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);

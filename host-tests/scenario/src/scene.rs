@@ -57,14 +57,15 @@ pub struct Scene {
     pub tx_w: f64,
     /// Transmit power of Rx when it sends toward Tx, W, > 0.
     pub rx_w: f64,
-    /// Required SIR toward Tx, as a fraction of the required SIR toward Rx. It is 0 if only the direction to Rx counts.
+    /// Required SIR toward Tx, as a fraction of the required SIR toward Rx. 0 means that only the direction from Tx to
+    /// Rx counts.
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
     /// Areas of interferers whose positions are uncertain, by index in `sources`.
     ///
-    /// Each receiver gets the interference from the area's point nearest to it. The SIR of a hop is therefore the SIR
-    /// for the worst position of the interferer.
+    /// For each receiver, the interferer is at the area's point nearest to the receiver. The SIR of a hop is therefore
+    /// the SIR for the worst position of the interferer.
     pub areas: BTreeMap<usize, Area>,
     /// Least and greatest altitude of each interferer, m, by index in `sources`; 0 if it is not in the map.
     ///
@@ -158,7 +159,7 @@ impl Scene {
         })
     }
 
-    /// Returns the interference power that a relay at `at` receives, W: the sum over all sources.
+    /// Returns the interference power that a relay at `at` receives, W: the sum over all interferers.
     pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
         let Place { x, y, h } = at.into();
         let each = self.offsets(x, y).enumerate();
@@ -168,7 +169,7 @@ impl Scene {
         .sum()
     }
 
-    /// Returns the height of a receiver above source `at`, m. The receiver is at the altitude `h_m`.
+    /// Returns the height of a receiver at the altitude `h_m` above the interferer with index `at`, m.
     fn climb_m(&self, at: usize, h_m: f64) -> f64 {
         let [low, high] = self.heights_m.get(&at).copied().unwrap_or_default();
         h_m - h_m.clamp(low, high)
@@ -203,8 +204,8 @@ impl Scene {
 
     /// Returns the linear SIRs of the N + 1 hops from Tx to Rx, with relay k at `places[k - 1]`.
     ///
-    /// A SIR is infinite if its two nodes share a position. The list is empty unless there is one position per relay,
-    /// and at least one relay.
+    /// A SIR is infinite if the two nodes of its hop share a position. The list is empty unless there is one position
+    /// per relay, and at least one relay.
     pub fn hop_sirs(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         if places.len() != self.relays.len() {
             return Vec::new();
@@ -224,8 +225,8 @@ impl Scene {
     /// Returns the linear SIRs of the N + 1 hops from Rx to Tx, with relay k at `places[k - 1]`.
     ///
     /// Node 0 is Tx, node k relay k, and node N + 1 Rx. Entry k - 1 is the SIR of the hop from node k to node k - 1. A
-    /// SIR is infinite if its two nodes share a position. The list is empty unless there is one position per relay, and
-    /// at least one relay.
+    /// SIR is infinite if the two nodes of its hop share a position. The list is empty unless there is one position per
+    /// relay, and at least one relay.
     pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
             return Vec::new();
@@ -243,7 +244,7 @@ impl Scene {
 
     /// Returns the linear SIR of the worst hop from Tx to Rx; 0 if [`Scene::hop_sirs`] returns no hop.
     ///
-    /// If `self.reverse` is above 0, the hops from Rx to Tx count, too, with their SIRs divided by `reverse`.
+    /// If `self.reverse` is above 0, the SIRs of the hops from Rx to Tx count as well, divided by `reverse`.
     pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
         let there = sirs.reduce(f64::min).unwrap_or(0.0);

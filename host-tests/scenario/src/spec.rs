@@ -21,7 +21,7 @@ pub struct Scenario {
     pub line: Option<Line>,
     /// Distance D from Tx to Rx, m, 1 to 1e6.
     pub distance_m: f64,
-    /// Altitude of all relays without their own altitude, m, 0.1 to 1e4.
+    /// Altitude of the relays that have no altitude of their own, m, 0.1 to 1e4.
     pub altitude_m: f64,
     /// Lowest altitude for methods that choose altitudes, m, 0.1 to `altitude_m` (its default).
     pub altitude_min_m: f64,
@@ -49,7 +49,7 @@ pub struct Scenario {
     pub areas: BTreeMap<usize, SourceArea>,
     /// Heights of the interferers' antennas above the ground, m, 0 to 1000, by index (from 0).
     ///
-    /// It is 0 for an interferer that is not in the map. The planner uses it only with elevation files.
+    /// The height is 0 for an interferer that is not in the map. The planner uses it only with elevation files.
     pub masts_m: BTreeMap<usize, f64>,
     /// No-fly areas, for the planner.
     pub no_fly: Vec<NoFly>,
@@ -84,9 +84,9 @@ pub struct TerrainSpec {
     ///
     /// The height counts from the highest ground at the positions where the relay may be within its position error.
     pub above_ground_m: f64,
-    /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
+    /// Greatest height of a relay above the ground, m, 0.1 to 1e4; `None` for no limit.
     ///
-    /// It counts from the highest ground within the relay's position error.
+    /// It counts from the ground straight below the relay.
     pub above_ground_max_m: Option<f64>,
     /// Error of the heights in the elevation files, m, 0 (its default) to 100.
     ///
@@ -135,7 +135,7 @@ pub struct ChannelSpec {
 /// [`Listen`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ListenSpec {
-    /// True if the interferer moves. Missing settings then have the defaults of [`Listen::following`].
+    /// True if the interferer moves. If true, missing settings have the defaults of [`Listen::following`].
     pub following: bool,
     /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
@@ -177,7 +177,7 @@ pub struct Noise {
     /// Noise power, dBm, -200 to 0. If given, it is used instead of the noise power computed from bandwidth and noise
     /// figure.
     pub power_dbm: Option<f64>,
-    /// Antenna gains, dBi, -30 to 60: of the relays, then of Rx. The default is 0.
+    /// Antenna gains, dBi, -30 to 60; 0 by default. Entry 0 is for the relays, entry 1 for Rx.
     pub gains_dbi: [f64; 2],
 }
 
@@ -211,8 +211,7 @@ impl Noise {
 
     /// Returns the noise power that a mission uses for all receivers, W.
     ///
-    /// It is [`Self::receiver_w`] divided by the antenna gain: the lower one, if the gains of the relays and of Rx
-    /// differ.
+    /// It is [`Self::receiver_w`] divided by the lower one of the antenna gains of the relays and of Rx.
     pub fn power_w(&self) -> f64 {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() / factor(relays.min(rx))
@@ -220,7 +219,8 @@ impl Noise {
 
     /// Returns true if there is noise, and the antenna gains of the relays and of Rx differ.
     ///
-    /// The mission has one noise power, for the lower gain. It is too high for the receivers with the higher gain.
+    /// The mission's only noise power is that for the lower gain. It is too high for the receivers with the higher
+    /// gain.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
@@ -274,7 +274,7 @@ pub struct BetaPoint {
     pub x_m: f64,
     /// First shape parameter of the Beta distribution, above 1 and at most 1e6.
     ///
-    /// At 1 or less the mean of 1/I would be infinite, for the interference power I.
+    /// At 1 or less the mean of 1/I would be infinite, where I is the interference power.
     pub alpha: f64,
     /// Second shape parameter of the Beta distribution, above 0 and at most 1e6.
     pub beta: f64,
@@ -379,7 +379,7 @@ pub struct Planned {
     pub uavs: u16,
     /// Placement method of the relays.
     pub method: PlannedMethod,
-    /// Relative tolerance of the SIR that the placement method achieves, 1e-6 to 0.1.
+    /// Maximum relative error of the SIR that the placement method achieves, 1e-6 to 0.1.
     pub tolerance: f64,
     /// SIR of the chain's worst hop at the planned positions, dB, -400 to 400.
     pub sir_db: f64,

@@ -1,9 +1,9 @@
 //! Upper bound of an image's stack, from its machine code.
 //!
 //! It parses stack use and calls of each function in the disassembly by `llvm-objdump`. A call through a pointer may
-//! reach any function whose address is in the image's constants; the one with the largest stack is assumed. An
-//! interrupt may occur at the deepest point; handlers of one priority do not nest. Recursion has no bound and is an
-//! error.
+//! reach any function whose address is in the image's constants. Of these functions, the one with the largest stack is
+//! assumed. An interrupt may occur at the deepest point; handlers of one priority do not nest. Recursion has no bound
+//! and is an error.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,11 +12,11 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Function {
     /// Mangled name of the function.
     pub name: String,
-    /// Size of its own stack frame, bytes.
+    /// Size of the function's own stack frame, bytes.
     pub frame: u64,
-    /// Addresses of the functions that it calls or jumps to.
+    /// Addresses of the functions that this function calls or jumps to.
     pub calls: BTreeSet<u64>,
-    /// True if it calls a function through a pointer.
+    /// True if the function calls any function through a pointer.
     pub indirect: bool,
 }
 
@@ -207,7 +207,7 @@ fn registers(operands: &str) -> u64 {
     list.split(',').count() as u64
 }
 
-/// Parses the number after `#` or `#-` in operands, decimal or hexadecimal, without its sign.
+/// Parses the number after `#` or `#-` in operands, decimal or hexadecimal; the sign is ignored.
 fn immediate(operands: &str) -> Option<u64> {
     let (_, text) = operands.split_once('#')?;
     let text = text.trim_start_matches('-');

@@ -6,7 +6,7 @@ use std::{fs, io};
 /// Folder with the files that all templates share.
 const COMMON: &str = "common";
 
-/// Dependency of each template on this crate. Its path is replaced.
+/// Dependency of each template on this crate. [`generate`] replaces its path.
 const CRATE: &str = "path = \"../uav-relay\"";
 
 /// Names of the templates and their folders, one for each kind of main loop.
@@ -21,7 +21,7 @@ pub fn checkout() -> PathBuf {
 /// Writes the firmware template `name` into `folder`, with a dependency on the crate of this checkout.
 ///
 /// # Errors
-/// The folder is not empty or inside this checkout, or a file cannot be read or written.
+/// The folder is not empty, it is inside this checkout, or a file cannot be read or written.
 pub fn generate(name: &str, folder: &Path) -> io::Result<()> {
     if fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some()) {
         let text = format!("{} is not empty", folder.display());

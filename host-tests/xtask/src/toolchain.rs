@@ -13,7 +13,7 @@ pub fn llvm_tool(name: &str) -> Option<PathBuf> {
     Some(lib.parent()?.join("bin").join(name)).filter(|path| path.exists())
 }
 
-/// Runs a command without its output; returns true if it succeeds.
+/// Runs a command and discards its output; returns true if the command succeeds.
 pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     let status = Command::new(program)
         .args(arguments)

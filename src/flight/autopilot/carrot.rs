@@ -14,21 +14,21 @@ use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// Distance to the setpoint at which the moving target counts as arrived, m.
+/// Maximum distance to the setpoint at which the moving target counts as arrived, m.
 const ARRIVED_M: f32 = 0.01;
 
-/// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s.
+/// Ratio k of the moving target's speed to its distance from the setpoint, near the setpoint, 1/s.
 const END_PER_S: f32 = 0.5;
 
 /// Minimum speed of the moving target near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
-/// Assumed gain of an autopilot's position control, 1/s. A drone d metres behind its target flies 1.25 d m/s faster
-/// than the target.
+/// Assumed gain of an autopilot's position control, 1/s. A drone d metres behind its target flies faster than the
+/// target by 1.25 d m/s.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// Maximum speed of the moving target, as a fraction of the speed limit. The rest is a margin, because a drone flies
-/// faster than its target at times.
+/// Maximum speed of the moving target, as a fraction of the speed limit. The rest is a margin, because at times a drone
+/// flies faster than its target.
 const CARROT_PART: f32 = 0.96;
 
 /// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the difference
@@ -42,9 +42,9 @@ const LEAST_PART: f32 = 0.1;
 
 /// Factor on the acceleration limit for velocity that does not lead toward a new setpoint.
 ///
-/// When the setpoint changes, the moving target still has its old velocity. The part of it toward the setpoint stays.
-/// Any other part is reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`]. The target
-/// does not turn at once, because the drone would then overshoot it and come back.
+/// When the setpoint changes, the moving target still has its old velocity. The component toward the new setpoint
+/// stays. Any other component is reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`].
+/// The target does not turn at once, because the drone would then overshoot it and come back.
 const TURN_PART: f32 = 2.0;
 
 /// Remaining distance of the moving target at which a stop counts as complete, m. The drone lags behind and then has up
@@ -52,11 +52,12 @@ const TURN_PART: f32 = 2.0;
 const SETTLED_M: f32 = 0.25;
 
 /// Assumed time from a new setpoint until the drone reacts, ms. It includes 200 ms for the transmission to the flight
-/// controller, and 1000 ms for the drone's lag.
+/// controller, and 1000 ms for the delay of the drone's motion.
 const BEHIND_MS: u64 = 1_200;
 
-/// Time in which the speed of the moving target near the setpoint halves, ms: ln 2 / k with k = 0.5 /s. The speed is k
-/// times the remaining distance.
+/// Time in which the moving target's speed halves near the setpoint, ms: ln 2 / k with k = 0.5 /s.
+///
+/// There the speed is k times the remaining distance.
 const HALVES_MS: u64 = 1_387;
 
 /// Maximum number of halvings of the speed that [`Pace::stopping_time`] counts. Eight of them reduce a remaining
@@ -67,7 +68,8 @@ const MOST_HALVES: u32 = 8;
 /// with the target's position at the same time.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
-/// Maximum time step of the moving target. After a longer gap it continues from its last position, without a jump.
+/// Maximum time step of the moving target. After a longer gap the target continues from its last position, without a
+/// jump.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
 
 /// Speed limit and acceleration of the moving target that is sent to an autopilot.
@@ -231,7 +233,7 @@ impl Carrot {
         let left = length(to);
         let a = pace.acceleration_m_s2;
         let turn = TURN_PART * a * dt;
-        // A new setpoint may be to the side or behind. The velocity in other directions is reduced first.
+        // A new setpoint may lie sideways or behind. The velocity that does not lead toward it is reduced first.
         let ahead = to.map(|part| part / left.max(ARRIVED_M));
         let toward = dot(self.velocity_m_s, ahead);
         let [x, y, up] = self.velocity_m_s;
@@ -309,8 +311,8 @@ const STANDING: Duration = Duration::from_millis(200);
 /// repetition makes an ArduCopter wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Number of consecutive reports of another target after which the sent one counts as refused. An ArduCopter reports
-/// its target twice a second.
+/// Number of consecutive reports of a different target after which the sent target counts as refused. An ArduCopter
+/// reports its target twice a second.
 const REFUSED_AFTER: u8 = 6;
 /// Age of the autopilot's last report of its target at which its target counts as unknown, s.
 const UNKNOWN_AFTER_S: u32 = 10;
@@ -319,7 +321,7 @@ const SENT_FOR: Duration = Duration::from_millis(3_000);
 
 /// Maximum difference between a standing target and the target reported by an ArduCopter, 1e-7 degrees.
 ///
-/// For a moving target it is [`NEAR_M`] metres plus the target's path in [`NEAR_S`] seconds.
+/// For a moving target the maximum is [`NEAR_M`] metres plus the distance that the target covers in [`NEAR_S`] seconds.
 const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
@@ -327,7 +329,7 @@ const NEAR_S: f32 = 1.0;
 /// Number of times that a standing target is repeated to an autopilot that never reports its target.
 const UNCONFIRMED: u8 = 10;
 
-/// Target that is sent to the autopilot, with its schedule and the autopilot's confirmation.
+/// Target that is sent to the autopilot, with its schedule and the autopilot's confirmation of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Target {
     pub(super) carrot: Carrot,
@@ -338,7 +340,7 @@ pub(super) struct Target {
     is_accepted: bool,
     /// Start of the time in which targets have been sent without a break.
     since: Instant,
-    /// Number of consecutive reports of another target by the autopilot.
+    /// Number of consecutive reports in which the autopilot's target is not the sent one.
     other_targets: u8,
     /// Time of the autopilot's last report of another target, s.
     compared_s: u32,
@@ -408,14 +410,16 @@ impl Target {
         before < REFUSED_AFTER && self.is_refused(now)
     }
 
-    /// Returns true while the autopilot reports another target. False after some seconds without a report.
+    /// Returns true while the autopilot reports a target other than the sent one. False after some seconds without a
+    /// report.
     pub(super) const fn is_refused(self, now: Instant) -> bool {
         self.other_targets >= REFUSED_AFTER
             && whole_s(now).wrapping_sub(self.compared_s) < UNKNOWN_AFTER_S
     }
 
-    /// Schedules the next target after the drone's position was sent as the target to a waiting PX4. A PX4 accepts the
-    /// mode OFFBOARD only while it receives targets.
+    /// Schedules the next target after the drone's own position was sent to a PX4 in the state `Standby`.
+    ///
+    /// A PX4 accepts the mode OFFBOARD only while it receives targets.
     pub(super) fn on_own_place_sent(&mut self, now: Instant) {
         self.due = now + STANDING;
     }
@@ -574,7 +578,7 @@ mod tests {
         }
     }
 
-    /// Returns a line of 1 km toward north.
+    /// Returns a line from Tx to Rx of 1 km toward north.
     fn axis() -> Axis {
         let site = |lat_e7| Geodetic {
             lat_e7,
@@ -588,7 +592,7 @@ mod tests {
         Axis::between(sites).unwrap()
     }
 
-    /// Returns how many reports of a moving target in 20 s count as another target.
+    /// Returns how many reports of a moving target in 20 s count as reports of a different target.
     ///
     /// The autopilot reports twice a second. It reports the position that was sent `lag` times 100 ms earlier, moved
     /// sideways by `aside_m`.
@@ -640,7 +644,7 @@ mod tests {
                 (second == 8, second == 8)
             );
         }
-        // The autopilot refuses a new setpoint, too.
+        // The autopilot refuses the second setpoint as well.
         target.renew(at(9));
         assert!(target.is_refused(at(17)));
         assert!(!target.is_refused(at(20)));

@@ -26,7 +26,7 @@ const ACCEPTED: u8 = 0;
 /// Value of `MAV_RESULT` for a denied command.
 const DENIED: u8 = 2;
 
-/// Lost relays on one side of this relay, upstream or downstream.
+/// Lost relays on one side of this relay, either upstream or downstream.
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
@@ -40,11 +40,11 @@ pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
     /// Last accepted command: its sender, and the numbers of the landed relays. `None` before the first one. A
-    /// repetition of the command is answered and has no other effect.
+    /// repetition of the last command is answered and has no other effect.
     accepted: Option<(Address, RelayNumbers)>,
     /// Unsent answer to a command: addressee and `MAV_RESULT`; `None` if there is none.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays have landed, until the relay has been informed; otherwise `None`.
+    /// Side whose lost relays have landed. `None` if there is none, and once the relay has been informed.
     cleared: Option<Side>,
 }
 
@@ -119,7 +119,7 @@ impl Clearance {
 }
 
 impl LostSide {
-    /// Returns true if `named` are exactly the lost relays of this side, and there is at least one.
+    /// Returns true if the numbers `named` are exactly those of the lost relays on this side, at least one.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);
@@ -205,7 +205,7 @@ mod tests {
         assert_eq!(clearance.command(FROM, named, true), None);
         assert_eq!(clearance.take_answer(), Some((FROM, ACCEPTED)));
         assert_eq!(clearance.take_cleared(), None);
-        // A new command of this kind contains no lost relay.
+        // A new command of the same kind names no lost relay.
         let event = clearance.command(FROM, named, false);
         assert!(matches!(event, Some(AutopilotEvent::ClearRefused { .. })));
     }

@@ -37,22 +37,22 @@ const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Maximum time between two targets to a PX4 that counts as on time. Later the PX4 is possibly in its failsafe.
+/// Maximum time between two targets to a PX4. After a longer time the PX4 is possibly in its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
-/// Time of regular positions before the state [`State::Blind`] (position lost) ends.
+/// Duration of regular position messages after which the state [`State::Blind`] (position lost) ends.
 const RECOVERY: Duration = Duration::from_millis(1_000);
 /// Time used instead of [`RECOVERY`] after two losses of the position within [`SHORT_TIME`].
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
-/// Maximum time between two losses of the position for which [`LONG_RECOVERY`] applies.
+/// Maximum time between two losses of the position at which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
 /// Maximum time from an ArduCopter's mode change to its report of the geofence breach that caused it.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason against control of the drone must last before it is reported.
+/// Time for which a reason why the relay cannot control the drone must last before it is reported.
 const SETTLED: Duration = Duration::from_millis(1_000);
-/// Minimum time between two reports of reasons against control of the drone.
+/// Minimum time between two reports of reasons why the relay cannot control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
 /// Time for which the guard must hold the drone back before the reason is reported to the operator.
@@ -84,26 +84,27 @@ pub struct Autopilot {
     /// Side of the neighbour to which a directional antenna points; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
     target: Option<Target>,
-    /// Position at which the moving target stops after the setpoint was withdrawn. `None` while there is a setpoint.
+    /// Position at which the moving target stops after a withdrawal of the setpoint. `None` while there is a setpoint.
     stop: Option<Placement>,
     /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never did.
     blind_at: Option<Instant>,
     /// Start of the time in which positions are received again in [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
-    /// Time of regular positions before the present state [`State::Blind`] ends.
+    /// Duration of regular positions after which the present state [`State::Blind`] ends.
     recovery: Duration,
     /// Loss of control over the drone that is still to be reported, and the time of the report. `None` if there is
     /// none.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and its start. `None` if the pilot can.
+    /// Reason why the pilot cannot give the relay control of the drone, and the time since which it holds. `None` if
+    /// the pilot can give control.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if nothing
-    /// has been reported. The inner `None` means that the pilot can.
+    /// has been reported. The inner `None` means that the pilot can give control.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the firmware reports that the relay is ready to control the drone.
     ready: bool,
-    /// Reported reasons why the guard (collision avoidance) holds the drone back. The first is because of the upstream
-    /// neighbour, the second because of the downstream neighbour.
+    /// Reported reasons why the guard (collision avoidance) holds the drone back. The first entry is the reason due to
+    /// the upstream neighbour, the second the reason due to the downstream neighbour.
     hold: [Option<HoldReason>; 2],
     /// Newest reasons why the guard holds the drone back, and the time of their last change. The order is that of
     /// `hold`.
@@ -276,7 +277,7 @@ impl Autopilot {
         let moved = |place| before.point(place).and_then(|point| axis.place(point));
         self.vehicle.move_places(moved);
         (self.setpoint, self.bearing, self.stop) = (None, None, None);
-        // The position was measured before the relay knew the line.
+        // The stored position was measured before the relay knew the new line.
         self.position = None;
         self.off_line_detector = OffLineDetector::default();
         self.target = self.target.and_then(|target| {
@@ -346,8 +347,8 @@ impl Autopilot {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
         if before != ready && self.state == State::Standby {
-            // Targets start anew, if at all. A PX4 gets them only after another heartbeat, because a PX4 that entered
-            // OFFBOARD without targets is in its failsafe.
+            // A PX4 gets targets again only after its next heartbeat, because a PX4 that entered OFFBOARD without
+            // targets is in its failsafe.
             self.target = None;
             if self.vehicle.kind() == Some(Kind::Px4) {
                 self.vehicle.unchoose();
@@ -431,7 +432,8 @@ impl Autopilot {
         self.events.state = Some(self.state);
         self.located_at = None;
         self.target = match self.state {
-            // The target starts at the drone's position, which may have drifted while the link was blind.
+            // The target starts at the drone's position, because the drone may have drifted while its position was
+            // unknown.
             State::Engaged => self.at_own_place(now),
             State::Blind => self.target,
             State::Silent | State::Grounded | State::Standby => None,
@@ -567,8 +569,8 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the present reason against control of the drone must be reported. `None` once it has
-    /// been.
+    /// Returns the time at which the reason why the relay cannot control the drone must be reported. `None` once it has
+    /// been reported.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -649,7 +651,7 @@ impl Autopilot {
             return None;
         }
         if self.state == State::Standby && kind == Kind::Px4 {
-            // The present position is sent so that the pilot can enter the mode.
+            // The drone's present position is sent as the target, so that the pilot can enter the mode.
             let due = self.target.map_or(now, |target| target.due);
             if due > now {
                 return None;
@@ -733,8 +735,8 @@ impl Autopilot {
         Some(Position { at, ..position })
     }
 
-    /// Returns the position of a drone too far from the line Tx to Rx, and its distance from it. Such a drone has no
-    /// position in the mission's coordinates.
+    /// Returns the position of a drone too far from the line Tx to Rx, and the distance from that line. Such a drone
+    /// has no position in the mission's coordinates.
     ///
     /// `None` if the drone is near the line, or if its last position is older than 3 s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
@@ -935,7 +937,7 @@ impl Autopilot {
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();
-        // The relay has checked that its sites form a valid line.
+        // The relay has already checked that its Tx and Rx positions form a valid line.
         if let Some(sites) = relay.sites().or(loaded)
             && sites != self.axis.sites()
             && let Ok(axis) = Axis::between(sites)

@@ -17,7 +17,7 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Minimum time between two equal lines to the operator, ms.
+/// Minimum time between two equal lines to the operator, ms. For lines that require action now see [`URGENT`].
 const SPACING: u32 = 10_000;
 
 /// Minimum time between two equal lines that require action now, ms.
@@ -41,7 +41,7 @@ const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 pub(super) enum Topic {
     /// Event about the control of the drone: the relay takes or loses control.
     Control,
-    /// Reason why the pilot cannot give the relay control of the drone.
+    /// Reason why the relay cannot control the drone now.
     Wait,
     /// Reason why the guard holds the drone back because of the upstream neighbour.
     Upstream,
@@ -98,7 +98,7 @@ impl Line {
 
     /// Returns the text for the reason why the guard (collision avoidance) holds the drone back on `side`.
     ///
-    /// `None` means that the reason has ended.
+    /// If `reason` is `None`, the text says that the reason has ended.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
             Side::Upstream => (Topic::Upstream, " the previous drone"),
@@ -164,7 +164,8 @@ fn left(now: Instant, until: u32) -> Option<Duration> {
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
-    /// Hashes of the lines sent in the last 10 s. Each has the earliest time of an equal line, in wrapping ms.
+    /// Hashes of the lines sent in the last 10 s. Each comes with the earliest time at which an equal line may be sent,
+    /// in wrapping ms.
     recent: Vec<(u32, u32), RECENT>,
     /// Hash of the last line sent on each topic; 0 before the first line. An equal line that would have to wait is
     /// dropped.
@@ -185,7 +186,7 @@ impl Report {
         if self.lines.is_full() {
             self.lines.remove(0);
         }
-        // The queue has room for the line.
+        // The line fits, because a full queue has just dropped one.
         let _ = self.lines.push(line);
     }
 
@@ -200,8 +201,8 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. This requires `spacing` ms
-    /// since the last equal line.
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. Equal lines must be at least
+    /// `spacing` ms apart.
     fn passes(&mut self, now: Instant, hash: u32, spacing: u32) -> bool {
         self.recent.retain(|(_, until)| left(now, *until).is_some());
         let until = millis(now.as_micros()).wrapping_add(spacing);
@@ -256,7 +257,7 @@ impl Report {
         None
     }
 
-    /// Sets the numbers to send to the operator: SIR, dB, and position of the relay. `None`: unknown.
+    /// Sets the numbers to send to the operator: SIR, dB, and position of the relay. `None` means unknown.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -337,7 +338,8 @@ pub enum AutopilotEvent {
     Ready,
     /// The autopilot refuses the target: for 3 s it has reported a target other than the sent one.
     ///
-    /// The sent position is outside the autopilot's geofence, or another companion sends targets to the same autopilot.
+    /// The sent position is outside the autopilot's geofence, or a second companion sends targets to the same
+    /// autopilot.
     Refused,
     /// The autopilot reports that the drone is outside of the autopilot's geofence.
     FenceBreached,
@@ -450,7 +452,7 @@ mod tests {
             let said = texts(&mut report, at(200 * i));
             assert_eq!(said.is_empty(), i >= 2, "{i}: {said:?}");
         }
-        // The last line was `off`, and it was also the last one that the operator has read. So no line is sent.
+        // The last line was "off", and it was also the last one that the operator has seen. So no line is sent.
         assert_eq!(texts(&mut report, at(30_000)).len(), 0);
         report.queue_line(ON);
         assert_eq!(texts(&mut report, at(31_000)).as_slice(), ["on"]);

@@ -85,7 +85,7 @@ impl State {
 /// modes.
 const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 
-/// Kind of autopilot firmware: PX4 or ArduPilot.
+/// Kind of autopilot firmware: PX4 or ArduCopter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// PX4: the mode OFFBOARD gives control for as long as targets are sent.
@@ -160,8 +160,8 @@ pub enum ReleaseCause {
     Failsafe,
     /// The drone left the autopilot's geofence.
     Fence,
-    /// The link to the autopilot was interrupted or late. A PX4 is then possibly in its failsafe, which targets would
-    /// end.
+    /// The link to the autopilot was interrupted or late. A PX4 is then possibly in its failsafe, and new targets would
+    /// end the failsafe.
     Link,
 }
 
@@ -196,14 +196,14 @@ impl Release {
     }
 }
 
-/// Reason why the relay cannot control the drone now. Either the pilot cannot give it control, or it does not use the
-/// mode OFFBOARD or GUIDED that the pilot has chosen.
+/// Reason why the relay cannot control the drone now. Either the pilot cannot give the relay control, or the relay does
+/// not use the mode OFFBOARD or GUIDED that the pilot has chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {
     /// The autopilot is in its failsafe, which ends when the pilot chooses a mode.
     Failsafe,
-    /// The link from the autopilot is late: its messages are old on arrival.
+    /// The autopilot's messages arrive late.
     Link,
     /// The autopilot was in OFFBOARD or GUIDED before this link started. The pilot must first choose another mode.
     Found,

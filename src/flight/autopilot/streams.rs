@@ -10,7 +10,8 @@ use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time in which received messages are counted. A message that comes too seldom is then requested again.
+/// Time in which received messages are counted. At the end of this time, a message that came too seldom is requested
+/// again.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
 /// Maximum time from a request for a message to its answer.
@@ -32,8 +33,8 @@ const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// True if the drone cannot be controlled without the message. Not every autopilot sends the other messages
-    /// (geofence, target).
+    /// True if the drone cannot be controlled without the message. The messages that are not vital (geofence, target)
+    /// are not sent by every autopilot.
     is_vital: bool,
 }
 
@@ -60,7 +61,7 @@ const REQUESTED: [RequestedMessage; 6] = [
     RequestedMessage::new(id::HOME_POSITION, 2_000, false),
 ];
 
-/// State of the request for one message.
+/// State of the requests for one kind of message.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     is_requested: bool,
@@ -136,8 +137,8 @@ impl Streams {
             return;
         }
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
-            // At the full rate twice as many messages and one more would have arrived. A division would need a proof
-            // that no interval is 0.
+            // At the full rate, more than twice as many messages would have arrived. The product avoids a division by
+            // the interval, which could be 0.
             let more = 2 * u64::from(stream.messages) + 1;
             let is_seldom = more * asked.interval.as_micros() <= passed.as_micros();
             stream.silent_windows = if stream.messages > 0 {
@@ -156,7 +157,7 @@ impl Streams {
 
     /// Restarts the requests for the autopilot's report of its target, once the relay controls the drone.
     ///
-    /// An ArduCopter sends that report only in GUIDED, so earlier requests were possibly given up.
+    /// An ArduCopter sends that report only in GUIDED, so the link has possibly stopped requesting it.
     pub(super) fn renew(&mut self) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;

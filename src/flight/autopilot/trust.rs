@@ -14,7 +14,7 @@ use crate::time::Instant;
 /// Number of consecutive heartbeats with a signature mismatch before the mismatch is reported.
 const IN_A_ROW: u8 = 3;
 
-/// Mismatch between the signatures of an autopilot and of the link.
+/// Mismatch between the signatures of an autopilot and those of the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Mistrust {
@@ -65,7 +65,7 @@ pub(super) struct Trust {
 }
 
 impl Trust {
-    /// Returns the next received message whose signature is acceptable; `None` if there is none.
+    /// Returns the next received message that passes the signature check, if any; otherwise `None`.
     pub(super) fn next_received(&mut self, now: Instant, parser: &mut Parser) -> Option<Received> {
         loop {
             let taken = parser.next_frame(|received, frame| {
@@ -106,7 +106,7 @@ impl Trust {
             return (true, no_key(received));
         };
         match received.message {
-            // The frame is no heartbeat, or its sender cannot sign.
+            // The frame is not a heartbeat, or its sender cannot sign.
             None | Some(Incoming::RadioStatus { .. }) => (true, None),
             Some(_) => match signing.check(now, received, frame) {
                 Ok(()) => (true, None),
@@ -133,8 +133,8 @@ impl Trust {
         }
     }
 
-    /// Returns the next signature mismatch to report. Each kind is returned once. `hears` is true if the autopilot
-    /// answers requests, false if it does not, and `None` if unknown.
+    /// Returns the next signature mismatch to report. Each kind is returned once. `hears` states if the autopilot
+    /// answers requests; `None` if unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL

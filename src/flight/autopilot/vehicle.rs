@@ -1,7 +1,7 @@
 //! State of the autopilot, from received messages.
 //!
-//! It has the autopilot's kind, reports and clock, the delay of the link, the drone's position, and the noise measured
-//! by a SiK radio.
+//! The state includes the autopilot's kind, reports and clock, the delay of the link, the drone's position, and the
+//! noise measured by a SiK radio.
 
 use super::state::{FlightMode, Kind, Observed};
 use crate::features::SENSING;
@@ -17,7 +17,7 @@ use crate::time::{Duration, Instant};
 /// Time without a heartbeat after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Age at which a received position of the drone is too old to be used.
+/// Age from which a received position of the drone is too old to be used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
 /// Silence of the autopilot after which a PX4 is possibly in its failsafe.
@@ -60,10 +60,10 @@ pub struct Position {
     pub velocity_m_s: [f32; 3],
 }
 
-/// News in a received MAVLink message.
+/// New information in a received MAVLink message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum VehicleUpdate {
-    /// The message is of another sender, or has no new information.
+    /// The message is not from the autopilot, or has no new information.
     Nothing,
     /// The message is the first one of an autopilot on this link.
     Found,
@@ -140,7 +140,7 @@ impl Vehicle {
         if self.address() != Some(from) {
             return VehicleUpdate::Nothing;
         }
-        // The battery's messages come at their own rate. They do not show that the link works.
+        // The battery's messages come at their own rate. Battery messages do not show that the link works.
         if self.read_battery(now, message) {
             return VehicleUpdate::StateChanged;
         }
@@ -200,7 +200,8 @@ impl Vehicle {
                     self.restart();
                     return VehicleUpdate::Restarted;
                 };
-                // The message was sent after the last answered request, and the position was measured shortly before.
+                // The message was sent after the last answered request, and its position was measured shortly before it
+                // was sent.
                 let floor = self.echo.floor().map(|at| {
                     Instant::from_micros(at.as_micros().saturating_sub(MEASURED.as_micros()))
                 });
@@ -215,7 +216,7 @@ impl Vehicle {
                     amsl_mm,
                 };
                 let Some(place) = axis.place(point) else {
-                    // Without a fix the position is 0, 0, which is near no usable line.
+                    // Without a fix the reported position is latitude 0, longitude 0, which is near no usable line.
                     return if (lat_e7, lon_e7) != (0, 0) && point.is_valid() {
                         VehicleUpdate::OffLine(point)
                     } else {
@@ -237,7 +238,7 @@ impl Vehicle {
                 self.is_breached = is_breached;
                 VehicleUpdate::StateChanged
             }
-            // A request of the autopilot contains no time of this link.
+            // A TIMESYNC request of the autopilot contains no time stamp of this link.
             Incoming::TimeSync {
                 answered: 1..,
                 asked,
@@ -309,7 +310,7 @@ impl Vehicle {
         Some(FlightMode::of(self.kind()?, self.mode))
     }
 
-    /// Discards the state received from an autopilot that has restarted since.
+    /// Discards the state that was received from an autopilot before it restarted.
     fn restart(&mut self) {
         self.heard_at = None;
         self.granted = false;
@@ -333,7 +334,8 @@ impl Vehicle {
         });
     }
 
-    /// Records a message about the battery or the home position. Returns false for any other message.
+    /// Records a message about the battery or the home position. Returns false, and records nothing, for any other
+    /// message.
     fn read_battery(&mut self, now: Instant, message: Incoming) -> bool {
         match message {
             // On the ground a PX4 computes the remaining time from an assumed current.
@@ -387,7 +389,7 @@ impl Vehicle {
         self.known.map(|(_, kind)| kind)
     }
 
-    /// Returns the drone's last position, `None` if it is unknown or too old.
+    /// Returns the drone's last position; `None` if it is unknown or too old.
     pub(super) fn position(&self, now: Instant) -> Option<Position> {
         self.position
             .filter(|position| now.since(position.at) < STALE && !self.echo.is_late(now))
@@ -430,9 +432,9 @@ impl Vehicle {
 const LANDED: Duration = Duration::from_millis(2_000);
 /// Age at which a BATTERY_STATUS or a position is too old for the endurance.
 ///
-/// SYS_STATUS is then used instead of BATTERY_STATUS, and the time of the flight home is unknown.
+/// SYS_STATUS is used instead of an old BATTERY_STATUS. With an old position the time of the flight home is unknown.
 const OLD: Duration = Duration::from_millis(10_000);
-/// Factor on the remaining time that the autopilot reports. It leaves a reserve of 10 %.
+/// Factor on the remaining time of flight that the autopilot reports. The factor leaves a reserve of 10 %.
 const CERTAIN: f32 = 0.9;
 
 /// Remaining time of flight according to the battery's messages.
@@ -442,7 +444,7 @@ pub(super) struct Battery {
     /// no messages are requested.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
-    /// Remaining time of flight, s; NaN if unknown. `None` on the ground, and once it has been read.
+    /// Remaining time of flight, s; NaN if unknown. `None` on the ground, and once the time has been read.
     newest: Option<f32>,
 }
 
@@ -474,7 +476,8 @@ impl Battery {
     }
 }
 
-/// Newest noise measurement of a SiK radio: drone's position, and noise in W. `None` once it has been read.
+/// Newest noise measurement of a SiK radio: drone's position, and noise in W. `None` once the measurement has been
+/// read.
 #[derive(Clone, Debug)]
 pub(super) struct RadioNoise(Option<(Placement, f32)>);
 
@@ -607,22 +610,23 @@ impl Echo {
     }
 }
 
-/// Minimum backward step of the autopilot's clock that shows a restart, µs.
+/// Minimum backward step of the autopilot's clock that counts as a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the time window of the minimum delay. The halves are replaced alternately, so that the minimum covers the
-/// last 4 to 8 s.
+/// Half of the time window in which the minimum delay is determined. The older half is replaced each time, so that the
+/// minimum covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of the time window of the minimum delay.
+/// Minimum number of messages in each half of the time window for the minimum delay.
 ///
 /// Otherwise a half could contain only the late messages after a pause of the link. Their delay would then count as
 /// normal.
 const LEAST: u8 = 8;
 
-/// Assumed maximum relative drift between the clocks of relay and autopilot, as an exponent: 2^-10.
+/// Assumed maximum drift between the clocks of relay and autopilot, as a fraction of time: 2^-10. The value is the
+/// exponent.
 ///
-/// With a faster drift messages seem late: the drift during the window of the minimum delay counts as delay.
+/// With a faster drift messages seem late: the drift during the time window counts as delay.
 const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's clock.
@@ -667,7 +671,8 @@ impl RemoteClock {
             self.creation_time(now, boot_ms);
             return None;
         }
-        // Messages arrive in order. So a clock that goes back has lost time, and the link is not slower.
+        // Messages arrive in order. So if the autopilot's clock goes back, the clock has lost time; the link is not
+        // slower.
         let lost = back.max(0);
         let drifted = (now.since(before).as_micros() >> DRIFT).cast_signed();
         if now.since(known.since) >= HALF && known.messages >= LEAST {
@@ -716,7 +721,8 @@ pub struct OffLine {
 }
 
 impl OffLine {
-    /// Returns the position `at` and its distance from the line `axis`. `None` if `at` is not on earth. Constant work.
+    /// Returns the position `at` and its distance from the line `axis`. `None` if the latitude or longitude of `at` is
+    /// invalid. Constant work.
     pub fn new(at: Geodetic, axis: &Axis) -> Option<Self> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -851,7 +857,7 @@ mod clock_tests {
     #[test]
     fn a_clock_that_drifts_is_followed() {
         let mut clock = RemoteClock::default();
-        // The relay's clock is faster by 500 in a million: it gains half a second.
+        // The relay's clock is faster than the autopilot's by 500 in a million: it gains half a second.
         for i in 0..5_000_u32 {
             let now = Instant::from_micros(u64::from(i) * 200_100);
             let true_at = clock.creation_time(now, i * 200).expect("the same start");
@@ -877,8 +883,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20), "{ages:?}");
     }
 
-    /// Checks a link whose delay jumps from 5 ms to 1.5 s. For 3 s its messages count as more than 1 s old. From 9 s
-    /// after the jump on, the new delay counts as normal.
+    /// Checks a link whose delay jumps from 5 ms to 1.5 s. For 3 s after the jump, messages count as more than 1 s old.
+    /// From 9 s after the jump, the new delay counts as normal.
     #[test]
     fn a_delay_that_grows_is_late_at_first() {
         let ages = ages(|ms| ms, |ms| if ms < 20_000 { 5 } else { 1_500 });

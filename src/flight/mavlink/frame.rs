@@ -35,7 +35,7 @@ pub const MAX_FRAME: usize = HEADER + MAX_PAYLOAD + CHECKSUM + SIGNATURE;
 pub const SIGNED: u8 = 1;
 
 /// CRC of MAVLink, computed bit by bit. A table would take a kilobyte of flash, and a link to an autopilot transports
-/// only some ten kilobytes a second.
+/// only about 10 kB/s.
 static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 
 /// MAVLink address: sender or addressee of a message.
@@ -62,7 +62,7 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
 pub struct Known {
     /// Id of the MAVLink message, 24 bits.
     pub id: u32,
-    /// CRC seed: a digest of the message's definition, so that both ends use the same one.
+    /// CRC seed: a digest of the message's definition, by which both ends detect different definitions.
     pub crc_extra: u8,
     /// Length of the original fields, bytes, without extensions of later dialects.
     pub length: u8,
@@ -108,8 +108,8 @@ pub mod id {
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// Maximum length of the extensions that a later dialect may add to a message, bytes. A longer message is treated as
-/// noise.
+/// Maximum length of the extensions that a later dialect may add to a message, bytes. A message with more bytes is
+/// treated as noise.
 const ADDED: u8 = 24;
 
 impl Known {
@@ -129,8 +129,7 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
 
 /// Messages that the parser knows: those of this crate, and those whose payload can contain frames.
 ///
-/// The parser skips a message with such a payload as a whole. It thus does not take a frame inside the payload for a
-/// received one.
+/// The parser skips a message with such a payload as a whole. So a frame inside the payload does not count as received.
 const TABLE: [Known; 31] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::SYS_STATUS, 124, 31),

@@ -1,7 +1,7 @@
 //! Received messages, and the parser of their byte stream.
 //!
-//! Senders are the autopilot, and ground stations through it. After an invalid frame the parser continues with the byte
-//! after its first one, so no valid frame is lost. A frame must have the id of a known message, so few false starts
+//! Senders are the autopilot, and ground stations through it. After an invalid frame the parser continues at the second
+//! byte of that frame, so no valid frame is lost. A frame must have the id of a known message, so few false starts
 //! occur in noise and in other messages.
 
 use super::frame::{
@@ -146,7 +146,7 @@ pub enum Incoming {
     TimeSync {
         /// Clock of the replying system, ns; 0 in a request.
         answered: u64,
-        /// Time stamp of the request, repeated in the reply, in units of the requesting system.
+        /// Time stamp of the request, repeated in the reply, in units chosen by the requesting system.
         asked: u64,
     },
     /// FENCE_STATUS: state of the vehicle's geofence.
@@ -263,7 +263,7 @@ pub fn noise_w(noise: u8) -> Option<f32> {
 pub struct Received {
     /// MAVLink address of the sender.
     pub from: Address,
-    /// Decoded message; `None` if this crate does not read this kind of message.
+    /// Decoded message; `None` if this crate does not decode messages with this id.
     pub message: Option<Incoming>,
     /// MAVLink id of the received message.
     pub id: u32,
@@ -277,8 +277,8 @@ pub struct Received {
 pub struct Counters {
     /// Number of valid MAVLink frames received.
     pub frames: u32,
-    /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. Most are corrupted
-    /// frames, but other bytes can also look like a frame.
+    /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. Most of them are
+    /// corrupted frames, but other received bytes can also look like a frame.
     pub broken: u32,
 }
 
@@ -319,7 +319,7 @@ impl Parser {
             return;
         }
         if self.bytes.push(byte).is_err() {
-            // The caller has not polled for messages.
+            // The caller has not called `next_message` often enough.
             self.bytes.clear();
         }
     }
@@ -332,8 +332,8 @@ impl Parser {
     /// Calls `read` with the next received message and the bytes of its frame, and returns the result. `None` without a
     /// message.
     ///
-    /// Work: for each received byte, at most one checksum over at most 266 bytes. In real frames one is computed at no
-    /// more than one byte in ten, in maliciously chosen bytes at one in three.
+    /// Work: for each received byte, at most one checksum over at most 266 bytes. In real frames a checksum is computed
+    /// for at most one byte in ten, in maliciously chosen bytes for one in three.
     pub fn next_frame<T>(&mut self, read: impl FnOnce(Received, &[u8]) -> T) -> Option<T> {
         while !self.bytes.is_empty() {
             match first(&self.bytes) {
@@ -360,13 +360,13 @@ impl Parser {
         self.counters
     }
 
-    /// Discards the first `length` received bytes, and the bytes up to the next possible start of a frame.
+    /// Discards the first `length` received bytes, and more up to the next possible start of a frame.
     fn drop_front(&mut self, length: usize) {
         let rest = self.bytes.get(length..).unwrap_or_default();
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();
         let from = length + skipped;
         let left = self.bytes.len().saturating_sub(from);
-        // A manual loop, since `copy_within` calls code of a kilobyte and a half of flash.
+        // A manual loop is used, since `copy_within` would add 1.5 KB of flash.
         for at in 0..left {
             let byte = self.bytes.get(from + at).copied().unwrap_or_default();
             if let Some(place) = self.bytes.get_mut(at) {

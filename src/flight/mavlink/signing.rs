@@ -35,16 +35,17 @@ const LAST: u64 = (1 << 48) - 1;
 
 const UNIT_US: u32 = 10;
 
-/// Time from 1970-01-01 to 2015-01-01, where the timestamps of signatures start, s.
+/// Time from 1970-01-01 to 2015-01-01, s. The timestamps of signatures start at the later date.
 const BEGIN_S: u64 = 1_420_070_400;
 
-/// Number of senders whose timestamps are remembered. An autopilot also forwards frames that other systems have signed.
+/// Number of senders whose timestamps are remembered. The autopilot counts as one; it also forwards signed frames of
+/// other systems.
 const SENDERS: usize = 8;
 
 /// Sender of signed frames, with the minimum timestamp of its next frame, which prevents replays.
 ///
-/// If [`SENDERS`] senders are known, a new one replaces the sender whose last frame is the oldest. Frames of the
-/// replaced sender that are at most a minute old could then be replayed.
+/// If [`SENDERS`] senders are known, a new one replaces the sender whose last frame is the oldest. Then recorded frames
+/// of the replaced sender could be replayed if they are at most a minute old.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
@@ -58,7 +59,7 @@ struct Sender {
 pub struct Stamp(u64);
 
 impl Stamp {
-    /// Timestamp on a board that does not know the time.
+    /// Timestamp on a board that does not know the date and time.
     pub const UNKNOWN: Self = Self(0);
 
     /// Converts a Unix time, µs since 1970-01-01.
@@ -74,9 +75,9 @@ impl Stamp {
 pub enum Flaw {
     /// The received MAVLink frame has no signature.
     Unsigned,
-    /// The signature was made with another key, or the frame was altered.
+    /// The signature was made with a different key than the link's, or the frame was altered.
     Key,
-    /// The signature's timestamp is in the past, or was used before.
+    /// The signature's timestamp is too old, or not above the last one of its sender.
     Old,
 }
 
@@ -180,7 +181,7 @@ impl Signing {
             Some(next) => stamp >= next,
             None => stamp.saturating_add(BEHIND) >= self.stamp,
         };
-        // The key is checked first, since a wrong key is the more informative reason.
+        // The key is checked first, because a wrong key is more informative than an old timestamp.
         if !is_same(self.tag(covered), *tag) {
             return Err(Flaw::Key);
         }

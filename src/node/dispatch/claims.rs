@@ -1,4 +1,4 @@
-//! Claims to this relay's node number, which another node possibly uses too.
+//! Claims to this relay's node number, in case another node uses the same number.
 
 use super::Node;
 use crate::event::{Event, NodeEvent};
@@ -14,7 +14,7 @@ impl Node {
         let settings = self.member.settings;
         let shown = match sender {
             Sender::Itself => false,
-            // Without signatures the frame may be this relay's own. Only a claim can show that.
+            // Without signatures, the frame may be an echo of this relay's own. Only a claim shows whose it is.
             Sender::Unknown => settings.auth.is_some(),
             Sender::Rival(rival) => rival.is_current,
         };
@@ -52,8 +52,8 @@ impl Node {
     /// Handles a claim message of node `from`. Nodes with the same node number detect each other by claims. Returns
     /// false if frames are signed, because signed handshakes then take the place of claims.
     ///
-    /// If node `from` claims its own number, its claim is sent back to it as an echo. An echo that arrives here
-    /// contains another node's claim to this relay's number. It is compared with this relay's claim.
+    /// A claim of node `from` to its own number is sent back to it as an echo. A claim to this relay's number is
+    /// compared with this relay's own claim.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -116,8 +116,8 @@ impl Node {
     /// Returns the number of the lease renewal that requires a handshake after `message`.
     ///
     /// `None` if `message` requires no handshake. On a shared channel one message of each lease renewal requires a
-    /// handshake. From this handshake another node with the same number detects this relay, even if the chain sends
-    /// nothing else.
+    /// handshake. By this handshake another node with the same number detects this relay, even if the chain sends no
+    /// other message.
     pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {
         let number = match message {
             Message::Pulse(pulse) if self.layers.neighbours.at(self.back()).has_no_peer() => {
@@ -146,7 +146,7 @@ impl Node {
     }
 
     /// Makes this passive relay active again, as after a restart. It leaves its view, because the other node with its
-    /// number has possibly changed this view.
+    /// number may have caused a view change.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

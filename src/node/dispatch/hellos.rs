@@ -11,7 +11,7 @@ use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 
-/// Mission fields of a hello: newest stored mission, and three flags.
+/// Mission fields of a hello: the newest mission that this relay has stored, and three flags.
 ///
 /// The flags state whether the mission is active at this relay, whether it is known to be active at all relays of the
 /// view, and whether it was refused.
@@ -112,9 +112,9 @@ impl Node {
 
     /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`.
     ///
-    /// Node `other` is at `side`, and its neighbour must be on the opposite side of this relay. One of three conditions
-    /// must also hold. Either this relay and that neighbour receive each other. Or this relay is linked to a nearer
-    /// node, and both are inserted together. Or this relay's link crosses the link of `other`.
+    /// Node `other` is at `side`, and its neighbour must be on the opposite side of this relay. In addition, one of
+    /// three conditions must hold. This relay and that neighbour receive each other; or this relay is linked to a
+    /// nearer node, and both can be inserted together; or this relay's link crosses the link of `other`.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -129,7 +129,7 @@ impl Node {
         let settings = &self.member.settings;
         let far = self.layers.neighbours.at(side.other());
         let distance = beyond.abs_diff(own);
-        // If two links cross, the one whose end is nearer to Rx is replaced.
+        // If two links cross, the link that ends nearer to Rx is replaced.
         let crosses = side == Side::Downstream && far.has_link_beyond(distance);
         fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
@@ -137,8 +137,8 @@ impl Node {
     /// Returns the number of relays that a neighbour reaches through this relay. These are this relay, and the relays
     /// on the side `far`.
     fn relays_through(&self, far: Side) -> u16 {
-        // A relay that has just started belongs to no part of the chain. A relay that was left out still has its count
-        // from the old view, although no neighbour selects it.
+        // A relay that has just started belongs to no part of the chain. A relay that the view leaves out still has its
+        // count from the view before, although no neighbour selects it.
         if self.layers.round.is_fresh() || !self.layers.neighbours.at(far).is_mutual() {
             1
         } else {
@@ -172,7 +172,7 @@ impl Node {
         self.layers.view.observe_view(hello.latest_view);
         if self.searches() {
             let heard = hello.is_heard(from, own);
-            // A hello without a request may be a reply to one that was just received.
+            // A hello that requests no reply may itself be the reply to a hello that was just sent.
             if heard || hello.requests_reply {
                 self.record_reception(side, from, heard);
             }
@@ -263,8 +263,8 @@ impl Node {
             return;
         }
         let pairs = hello.neighbour == own;
-        // The candidate reaches all relays beyond the current neighbour except one. So these relays have a link past
-        // that one.
+        // The candidate reaches all relays beyond the current neighbour except one. So the other relays have a link
+        // that skips that one.
         let all_but_one = hello.behind > 1 && hello.behind.checked_add(1) == Some(there);
         let candidate = Candidate {
             node: from,

@@ -1,4 +1,4 @@
-//! Received messages: which are accepted, from which side they come, and which layer handles them.
+//! Received messages: checks, the sender's side, and the layer that handles the message.
 
 use super::Node;
 use crate::event::NodeEvent;
@@ -14,7 +14,7 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`. Returns false if this node must not send such a message.
+    /// Handles an intact message from node `from` at `side`. Returns false if node `from` must not send such a message.
     ///
     /// Work: at most the computation of this relay's positions for 16 target SIRs.
     #[inline(never)]
@@ -85,8 +85,8 @@ impl Node {
     /// Returns true if `message` belongs to the current mission and view. The view is compared only for messages that
     /// depend on it.
     ///
-    /// Any other message is counted and answered by a hello. If the message belongs to an agreement of another view,
-    /// this relay also requests a new view.
+    /// A message of a different mission or view is counted and answered by a hello. If it belongs to an agreement on
+    /// positions, this relay also requests a new view.
     fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.digest() else {
             return true;
@@ -118,7 +118,7 @@ impl Node {
     }
 
     /// Returns true if node `from` uses the same x axis, the line from Tx to Rx. `digest` in the node's message
-    /// identifies the axis. A message with another axis is counted as rejected.
+    /// identifies the axis. A message with a different axis is counted as rejected.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.layers.update.line_digest(&self.member);
         if !same && self.layers.neighbours.at(side).latest_mission.is_some() {
@@ -187,7 +187,7 @@ impl Node {
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
         let effects = match message {
-            // The relays that it leaves out may be linked at any moment. The proposal will be retransmitted.
+            // The relays that the proposal leaves out may be linked soon. The proposal will be retransmitted.
             Message::Proposal(proposal) if layers.is_premature(now, side, proposal) => {
                 Effects::STALE
             }
@@ -229,8 +229,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first`), messages
-    /// that the node could not verify are repeated.
+    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first`), this
+    /// relay repeats the messages that the node could not verify before.
     pub(crate) fn on_authentic(&mut self, now: Instant, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
@@ -240,7 +240,7 @@ impl Node {
         }
         if self.layers.neighbours.at(side).node() != from {
             if first {
-                // That node could not verify earlier messages of this relay.
+                // Node `from` could not verify earlier messages of this relay.
                 self.schedule_hello(side, from, true);
             }
             return;
@@ -250,8 +250,8 @@ impl Node {
         }
     }
 
-    /// Handles a valid handshake of node `from` at `side`. The node counts as not receiving this relay, because the
-    /// handshake does not prove it.
+    /// Handles a valid handshake of node `from` at `side`. The handshake does not prove that the node receives this
+    /// relay, so the node counts as not receiving it.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {
@@ -259,8 +259,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake of node `from` at `side` that is signed with another key. After several in a row the node is
-    /// reported to the firmware.
+    /// Handles a handshake of node `from` at `side` that is not signed with this relay's key. After several in a row
+    /// the node is reported to the firmware.
     pub(crate) fn on_forged(&mut self, now: Instant, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         let before = self.refusals(now);
@@ -285,7 +285,7 @@ impl Node {
 }
 
 impl Node {
-    /// Returns the side toward the last relay.
+    /// Returns the side of this relay toward the last relay, away from the leader.
     pub(super) const fn onward(&self) -> Side {
         Side::onward(self.member.mission.heading())
     }
@@ -327,13 +327,13 @@ impl Node {
         }
     }
 
-    /// Returns true on a shared channel, where a relay receives many nodes and searches for its neighbours.
+    /// Returns true on a shared channel. There a relay receives many nodes, and searches for its neighbours.
     pub(super) fn searches(&self) -> bool {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` received at port `through`. If the node is also received at the other port, two
-    /// nodes use the same number, which is reported to the firmware.
+    /// Handles a frame of node `from` received at port `through`. If node `from` is also received at the relay's other
+    /// port, two nodes use the same number, and this is reported to the firmware.
     pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

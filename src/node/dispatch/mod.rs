@@ -1,7 +1,7 @@
 //! Dispatch of messages, timers and effects to the layers.
 //!
-//! [`Node`] is one struct. Each file has its methods for one purpose. This file has the state and the layers. It
-//! applies the effects of one layer to the others, and selects the next message by urgency.
+//! [`Node`] is one struct. Each file has the methods of `Node` for one purpose. This file has its state and the layers.
+//! It applies the effects of one layer to the other layers, and selects the next message by urgency.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -239,7 +239,7 @@ impl Node {
     }
 
     /// Returns the start and end of this relay's time slots, as fractions of the frame. `None` without a valid
-    /// agreement, and for equal slots.
+    /// agreement, and if all slots have the same length.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         let void = self.layers.lease.has_lapsed() || self.layers.view.has_no_quorum();
         self.layers.round.slot_shares().filter(|_| !void)
@@ -356,8 +356,10 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` would leave out relays that are about to be linked. This is assumed
-    /// if it has visited fewer relays than the previous proposal, and its sender has only just become the neighbour.
+    /// Returns true if a view proposal from `side` would leave out relays that are about to be linked.
+    ///
+    /// This is assumed if the proposal has visited fewer relays than the previous one, and its sender has only just
+    /// become the neighbour.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
@@ -381,10 +383,10 @@ pub(super) struct Telemetry {
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time without a quorum after which relays first drop their links, in units of `dead_after`.
+/// Time without a quorum until relays drop their links for the first time, in units of `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time between later drops of the links while there is no quorum, in units of `dead_after`.
+/// Time between later drops of the links, while there is still no quorum, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
 /// Timer after which a relay without a quorum drops its links and searches for other neighbours.
@@ -416,7 +418,7 @@ impl Node {
         }
     }
 
-    /// Returns the time after which links are dropped while there is no quorum.
+    /// Returns the time without a quorum after which links are dropped.
     fn link_retention(&self) -> Duration {
         let settings = &self.member.settings;
         let times = if self.no_quorum_timer.has_expired {
@@ -482,14 +484,14 @@ impl Node {
         Some((side, to, Message::Fence { line_digest, fence }))
     }
 
-    /// Returns the next message of a view change, a lease renewal or an agreement on positions.
+    /// Returns the next pending message of a view change, a lease renewal or an agreement on positions.
     ///
-    /// The result includes its side and destination node. `None` if no message is pending.
+    /// The result includes the side and the destination node. `None` if no message is pending.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {
             let neighbour = self.layers.neighbours.at(side);
-            // A lost neighbour gets no retransmissions until it is received again.
+            // A lost neighbour gets no retransmissions until this relay receives it again.
             (neighbour.is_mutual() && !neighbour.is_silent())
                 .then_some((neighbour.node(), neighbour.is_agreed()))
         };

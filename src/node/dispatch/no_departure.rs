@@ -79,7 +79,7 @@ impl Node {
 
     /// Returns true if node `from` is outside of the chain and must not be selected.
     ///
-    /// If it is the neighbour, its hello ends the link, like any hello of a neighbour that has not selected this relay.
+    /// If node `from` is the neighbour, its hello ends the link, because it has not selected this relay.
     pub(super) fn on_departure(&self, _: Instant, side: Side, from: u16, hello: &Hello) -> bool {
         hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
     }

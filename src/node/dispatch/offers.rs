@@ -12,8 +12,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// Handles a message from the ground station at `side` (Tx or Rx). Returns false if a ground station must not send
-    /// such a message.
+    /// Handles a message from the ground station at `side` (Tx or Rx). Returns false for a message that no ground
+    /// station may send.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,
@@ -84,8 +84,8 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `offer_number` is the number of a recent hello of this relay. An offer must repeat such a
-    /// number. Any other offer is counted as stale.
+    /// Returns true if `offer_number` is the number of a recent hello of this relay. Otherwise the offer is counted as
+    /// stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers
@@ -99,8 +99,8 @@ impl Node {
 
     /// Handles a mission offer from node `from` at `side`. The node has loaded the same mission before flight.
     ///
-    /// An offer that repeats no recent number is answered by a hello. The next offer can repeat the number of this
-    /// hello. After any other offer a hello is sent only if this relay has stored or refused the mission, or has a
+    /// An offer that repeats no recent number is answered by a hello, and the next offer can repeat the number of that
+    /// hello. An offer with a recent number is answered only if this relay has stored or refused the mission, or has a
     /// newer one. Otherwise the hello would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
@@ -128,7 +128,7 @@ impl Node {
         }
     }
 
-    /// Stores `upload` if it is newer than the stored mission. If it does not fit the line from Tx to Rx or the
+    /// Stores `upload` if it is newer than the stored mission. If it contradicts the positions of Tx and Rx or the
     /// geofence, it is refused, counted, and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
@@ -176,8 +176,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles a neighbour's report that the mission `refused` is refused. The neighbour or a relay beyond it has
-    /// refused the mission.
+    /// Handles a neighbour's report that the mission `refused` is refused. Either the neighbour or a relay beyond it
+    /// has refused it.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {
@@ -194,7 +194,7 @@ impl Node {
     }
 
     /// Compares `holds`, the stored mission of node `from` at `side`, with this relay's newest mission. If `holds` is
-    /// older, schedules an offer. If it is newer, schedules a hello that requests an offer.
+    /// older, an offer is scheduled. If it is newer, a hello that requests an offer is scheduled.
     pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;
@@ -220,8 +220,8 @@ impl Node {
         }
     }
 
-    /// Returns the pending mission offer to the neighbour at `side`; `None` if none is pending. Without a recent hello
-    /// of the neighbour to answer, returns a hello that requests one.
+    /// Returns the pending mission offer to the neighbour at `side`; `None` if none is pending. An offer must answer a
+    /// recent hello of the neighbour. If there is none, returns a hello that requests one.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

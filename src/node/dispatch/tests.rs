@@ -202,7 +202,7 @@ fn a_relay_offers_a_newer_mission_or_reports_its_own() {
     );
     let new = upload(1);
     node.handle_upload(NOW, &new).unwrap();
-    // The mission of the neighbour is unknown, so the relay at once requests a hello that an offer can answer.
+    // The mission of the neighbour is unknown. So the relay at once requests a hello, which an offer can answer.
     let told = sent_messages(&mut node);
     assert!(
         matches!(
@@ -247,7 +247,7 @@ fn without_a_key_no_upload_is_accepted() {
     );
     assert_eq!(node.upload(), None);
     assert_eq!(sent_messages(&mut node), []);
-    // Messages of the ground are not accepted either.
+    // Messages that claim to come from the ground are not accepted either.
     assert_eq!((node.side_of(0), node.side_of(4)), (None, None));
     let signed = relay(true);
     assert_eq!(signed.side_of(0), Some(Side::Upstream));
@@ -277,7 +277,7 @@ fn an_offer_for_other_relays_is_refused() {
     );
 }
 
-/// Checks that an offer of a node that is not the neighbour is answered by one hello only. Otherwise the exchange of
+/// Checks that an offer from a node other than the neighbour is answered by a single hello. Otherwise the exchange of
 /// offers and hellos would never end.
 #[test]
 fn an_offer_of_an_unselected_node_is_answered_once() {
@@ -309,8 +309,8 @@ fn an_offer_of_an_unselected_node_is_answered_once() {
     );
 }
 
-/// Checks that an offer that arrives too late is answered by a hello only. A new offer that repeats the number of this
-/// hello is accepted.
+/// Checks that an offer that arrives too late is answered by a hello and not stored. A new offer that repeats the
+/// number of this hello is accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {

@@ -110,8 +110,8 @@ impl Node {
         if self.layers.neighbours.at(self.onward()).has_no_peer()
             && self.layers.view.outstanding().is_some()
         {
-            // The relay that should reply to the outstanding proposal is lost. So this relay is the last one and
-            // decides.
+            // The next relay, which should reply to the outstanding proposal, is lost. So this relay is the last one
+            // and decides.
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.view.decide(&context);
             self.apply(now, effects);
@@ -127,7 +127,7 @@ impl Node {
 
     /// Restarts the timers for silent neighbours and the first message, after the joint computation.
     ///
-    /// All relays compute at the same time and send nothing, and these timers must not expire by that.
+    /// All relays compute at the same time and send nothing meanwhile. These timers must not expire because of that.
     fn on_solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);
@@ -143,7 +143,7 @@ impl Node {
         self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }
 
-    /// Starts the timeout of the first message along the chain. If it expires, the relay requests a new view.
+    /// Starts the timer for the first message along the chain. If the timer expires, the relay requests a new view.
     pub(super) fn await_first(&mut self, now: Instant) {
         let (settings, all) = (&self.member.settings, self.member.all);
         let there_and_back = settings.hop_time.times(2 * u32::from(all));

@@ -49,8 +49,8 @@ struct Heard {
 }
 
 impl Heard {
-    /// Returns the record after a frame from the node at `distance`. The record restarts after a silence of more than
-    /// `gap`, or if `known` describes another node.
+    /// Returns the record after a frame from the node at `distance`. It is a new record if the node was silent for
+    /// longer than `gap`, or if `known` is the record of a different node.
     fn updated(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
             Some(known) if known.distance == distance && now.since(known.last) <= gap => {
@@ -71,12 +71,12 @@ impl Heard {
 struct Link {
     /// Time of the last loss of the link.
     lost_at: Instant,
-    /// Times of the first and the last frame since the last loss of the link; `None` if there was none.
+    /// Times of the first and the last frame since the last loss of the link; `None` without such a frame.
     back: Option<Heard>,
     losses: u8,
     /// True if the last loss does not count, because the channel was bad.
     excused: bool,
-    /// True if no frame came for longer than `dead_after` after the last loss.
+    /// True if the node was silent for longer than `dead_after` after the last loss.
     was_down: bool,
     /// Time between the last two losses of the link; 0 if there was no earlier loss that counts.
     interval: Duration,
@@ -104,7 +104,7 @@ impl Link {
         }
     }
 
-    /// Returns true while the link must not be used because it was lost repeatedly (hold-down). The hold-down ends once
+    /// Returns true during the hold-down: the link was lost repeatedly and must not be used. The hold-down ends once
     /// the node has been received without gaps for long enough.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(MAX_FORGIVEN + 1) else {
@@ -115,9 +115,9 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link. `losses` is the number of recent losses before it.
+    /// Records a loss of the link. `losses` is the number of recent losses before this one.
     ///
-    /// If `counted` is false, this loss counts only if the node is then silent for long.
+    /// If `counted` is false, this loss counts only after a long silence of the node.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -152,7 +152,7 @@ impl Damping {
 
     /// Clears the record of lost links at the start of the relay.
     ///
-    /// It works in place, because a copy would need more stack than any other step of the start.
+    /// It changes the value in place, because a copy would need more stack than any other step of the start.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);
@@ -170,8 +170,8 @@ impl Damping {
     /// Records the loss of the link to the node `distance` relays away. If `counts` is false, because the channel loses
     /// many frames, only the loss of a flapping link counts.
     ///
-    /// If another link on this side flaps, the lost link takes over its number of losses. All links of a side cross the
-    /// same gap in the chain.
+    /// If another link on this side flaps, the lost link takes over its number of losses. The reason is that all links
+    /// on one side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -257,8 +257,9 @@ impl Damping {
         self.links.iter().any(is_slow)
     }
 
-    /// Returns true if the last loss of the link to the node `distance` relays away was an outage. An outage is more
-    /// than `dead_after` without a frame.
+    /// Returns true if the last loss of the link to the node `distance` relays away was an outage.
+    ///
+    /// An outage is a silence of more than `dead_after`.
     pub(super) fn was_down(&self, distance: u16) -> bool {
         self.link(distance).is_some_and(|link| link.was_down)
     }
@@ -284,8 +285,8 @@ impl Damping {
         now: Instant,
         settings: &Settings,
     ) -> bool {
-        // If two nodes are received alternately the nearer one counts. Otherwise neither would be received without a
-        // gap.
+        // If frames of two nodes alternate, only the nearer node counts. Otherwise each would interrupt the record of
+        // the other.
         if let Some(known) = self.candidate
             && known.distance < distance
             && now.since(known.last) <= settings.dead_after

@@ -1,4 +1,4 @@
-//! Nodes on one side: recently received nodes, consecutive events, and pending hellos.
+//! Nodes on one side of a relay: recently received nodes, consecutive events, and pending hellos.
 
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -8,8 +8,8 @@ pub(crate) use crate::wire::CANDIDATES;
 /// Minimum interval between two reports to the firmware about the same refused node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// Number of consecutive events at each of the four nearest nodes. An event is, for example, a handshake signed with
-/// another key.
+/// Number of consecutive events at each of the four nearest nodes. An event is, for example, a handshake that is signed
+/// with a wrong key.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
@@ -32,7 +32,7 @@ impl ConsecutiveCounts {
         reached
     }
 
-    /// Returns true if the last `most` events of the node `distance` relays away were in a row.
+    /// Returns true after at least `most` events in a row at the node `distance` relays away.
     pub(super) fn has(self, distance: u16, most: u8) -> bool {
         let times = self.0.get(usize::from(distance).wrapping_sub(1));
         times.is_some_and(|times| *times >= most)
@@ -64,25 +64,25 @@ impl Refusals {
         before: 0,
     };
 
-    /// Records a message with another mission from the node `distance` relays away. Returns true at most once a minute
-    /// for each node.
+    /// Records a message with a different mission than this relay's from the node `distance` relays away. Returns true
+    /// at most once a minute for each node.
     pub(super) fn add_mission(&mut self, distance: u16, now: Instant) -> bool {
         self.add(mask(distance), now)
     }
 
-    /// Records a handshake with another key from the node `distance` relays away.
+    /// Records a handshake with a wrong key from the node `distance` relays away.
     pub(super) fn add_key(&mut self, distance: u16, now: Instant) {
         self.add(mask(distance) << CANDIDATES, now);
     }
 
-    /// Records that the node `distance` relays away no longer uses another key.
+    /// Records that the node `distance` relays away uses this relay's key.
     pub(super) fn remove_key(&mut self, distance: u16) {
         let kept = !(mask(distance) << CANDIDATES);
         self.now &= kept;
         self.before &= kept;
     }
 
-    /// Returns the distances of the nearest nodes with another mission and with another key; 0 for none.
+    /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
     ///
     /// Only nodes fewer than `end` relays away count.
     pub(super) fn nearest(mut self, now: Instant, end: u16) -> [u16; 2] {

@@ -27,10 +27,11 @@ use crate::time::{Duration, Instant};
 
 /// Minimum number of unanswered heartbeat requests before a neighbour counts as lost.
 ///
-/// After a silence of the maximum lease duration it counts as lost in any case.
+/// After a silence as long as the maximum lease, it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// A neighbour counts as lost after this multiple of its longest recent run of unanswered requests.
+/// Ratio of unanswered requests at a loss to the longest recent run of unanswered requests. ¶ With fewer requests a
+/// neighbour does not count as lost yet.
 const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour.
@@ -41,7 +42,7 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
 
-/// Returns the interval between heartbeat requests while many relays have no agreement yet.
+/// Returns the interval between heartbeat requests before the first agreement on positions.
 ///
 /// It is longer than usual, because all these relays search on one channel. It is still short enough for three requests
 /// between `probe_after` and `dead_after`.
@@ -78,19 +79,19 @@ fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     Duration::from_micros(micros)
 }
 
-/// Returns the silence of a neighbour after which a heartbeat is requested. It is `Settings::probe_after`, or the round
-/// trip through `all` relays if that is longer, and at most the longest lease.
+/// Returns the silence of a neighbour after which a heartbeat is requested. ¶ It is the longer one of
+/// `Settings::probe_after` and the round trip through `all` relays, but at most the longest lease.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Number of the latest heartbeat requests whose replies are still accepted.
+/// Replies are accepted to this number of latest heartbeat requests.
 const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Latest time at which the neighbour is known to have been alive; at first the start of this relay.
+    /// Latest time at which the neighbour was provably alive; at first the start of this relay.
     last_sign: Instant,
     lost: bool,
     /// True if the neighbour has been received since the start, or since it was lost.
@@ -134,8 +135,8 @@ impl Liveness {
         }
     }
 
-    /// Restarts the record for another node as the neighbour. The longest run of unanswered requests is kept, because
-    /// it describes the channel.
+    /// Restarts the record, because a different node is the neighbour now. The longest run of unanswered requests is
+    /// kept, because it describes the channel.
     ///
     /// The unanswered requests to the previous node count as a run, unless `was_down` is true: then they measure an
     /// outage of the link. If `flaps` is true (the link flaps slowly), all runs are dropped.
@@ -224,8 +225,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the silent neighbour is lost, which needs at least a silence of `dead`. `tick` is the time to
-    /// the next check.
+    /// Checks at `now` if the silent neighbour is lost, which needs at least a silence of `dead`. `tick` is the time
+    /// until the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

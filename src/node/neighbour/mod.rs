@@ -32,8 +32,8 @@ impl Neighbours {
         downstream: Neighbour::NONE,
     };
 
-    /// Starts both sides of relay `node` at `now`. Its first neighbours are the relays with the next node numbers, in a
-    /// chain of `all` relays.
+    /// Starts both sides of relay `node` at `now`. Its first neighbours are the relays with the adjacent node numbers,
+    /// in a chain of `all` relays.
     pub(crate) fn begin(
         &mut self,
         node: u16,
@@ -82,7 +82,7 @@ impl Neighbours {
         self.downstream.leave();
     }
 
-    /// Records that a view proposal was refused. A side requests no new view until its neighbour changes.
+    /// Records that a view proposal was refused. No new view is requested until a neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();

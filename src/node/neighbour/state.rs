@@ -49,7 +49,7 @@ enum NeighbourState {
     NoPeer,
     /// The node has selected this relay, too, according to its last report.
     Linked,
-    /// The node that this relay has selected has not selected this relay, or no longer does.
+    /// This relay has selected the node, but the node has not selected this relay, or no longer does.
     Pairing {
         since: Instant,
     },
@@ -64,15 +64,15 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour; 0 if there is none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time until which no new view is requested after the selection of a neighbour. The relay beyond it possibly
-    /// selects the neighbour at the same time, and one view change is enough for both.
+    /// Time until which no new view is requested after the selection of a neighbour. A second relay possibly selects
+    /// the same neighbour at this time, and one view change is enough for both.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Node whose link was dropped because there was no quorum; 0 if another was selected since.
+    /// Node whose link was dropped because there was no quorum; 0 once a different node has been selected.
     dropped: u16,
-    /// Previous neighbour, which a nearer node has replaced; 0 for none.
+    /// Previous neighbour, which was replaced by a nearer node; 0 for none.
     replaced: u16,
     /// Time at which the last search for a neighbour began.
     searches_since: Instant,
@@ -88,13 +88,13 @@ pub(crate) struct Neighbour {
     unselected_at: Option<Instant>,
     /// Nodes on this side that this relay has recently received.
     pub(super) hearing: Hearing,
-    /// Number of consecutive hellos, for each node, that do not list this relay as received.
+    /// Number of consecutive hellos of each node that do not report reception of this relay.
     pub(super) not_received: ConsecutiveCounts,
     /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Bit 0 is the nearest node.
     reported_found: u8,
     /// Nodes on this side whose mission or key this relay has recently refused.
     refusals: Refusals,
-    /// Number of consecutive handshakes with another key, for each node on this side.
+    /// Number of consecutive handshakes with a wrong key, for each node on this side.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
@@ -166,7 +166,7 @@ impl Neighbour {
         self.node = node;
         self.agreed = AgreedNodes::on(node);
         self.state = NeighbourState::Linked;
-        // Other relays may have closed the gap that this relay left, so it announces itself soon.
+        // During this relay's absence other relays may have closed the gap that it left, so it announces itself soon.
         let soon = Duration::from_micros(settings.probe_after.as_micros() / 4);
         let wait = match settings.wiring {
             // The first message along the chain arrives without a request.
@@ -244,8 +244,8 @@ impl Neighbour {
 
     /// Restarts the measurement of the neighbour's silence at `now`, after this relay's computation.
     ///
-    /// Relays send nothing while they compute. Returns false, and does nothing, unless the neighbour is linked, a
-    /// member of the view and not lost.
+    /// Relays send nothing while they compute. Returns false, and does nothing, unless the neighbour is linked, not
+    /// lost, and a member of the view.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -267,8 +267,8 @@ impl Neighbour {
 
     /// Handles the timer of this side. Returns true if this call has found the neighbour to be lost.
     ///
-    /// A neighbour is not lost before a silence of `dead`. If `can_search` is true, another node can be selected in
-    /// place of a lost neighbour, as on a shared channel. `interval` is the time between heartbeat requests; `None` for
+    /// A neighbour is not lost before a silence of `dead`. If `can_search` is true, as on a shared channel, a different
+    /// node can be selected in place of a lost neighbour. `interval` is the time between heartbeat requests; `None` for
     /// the usual time.
     pub(crate) fn handle_timeout(
         &mut self,
@@ -397,8 +397,9 @@ impl Neighbour {
         self.hellos.schedule_all();
     }
 
-    /// Returns true if the link to `node` was the last to be dropped for lack of a quorum. False once a node has been
-    /// selected.
+    /// Returns true if `node` was the neighbour whose link was dropped last for lack of a quorum.
+    ///
+    /// False once any node has been selected.
     const fn was_dropped(&self, node: u16) -> bool {
         node != 0 && self.dropped == node
     }
@@ -429,13 +430,13 @@ impl Neighbour {
         let node = candidate.node;
         let none = Duration::from_micros(0);
         let distance = candidate.distance;
-        // A flapping link must first stay up for a while.
+        // A flapping link must first have been up for a while.
         if self.damping.is_held_down(distance, now, settings) {
             return false;
         }
         let is_selected = match self.state {
             NeighbourState::Searching { since } => {
-                // A nearer node may be received soon, or a node other than the dropped one.
+                // A nearer node may be received soon, or a node other than the one whose link was dropped.
                 let wait = if self.was_dropped(node) {
                     settings.probe_after
                 } else {
@@ -447,7 +448,7 @@ impl Neighbour {
                 candidate.pairs || self.damping.has_waited(distance, none, now, settings)
             }
             NeighbourState::Linked | NeighbourState::Pairing { .. } => {
-                // If each of two relays could leave out a node, the relay nearer to Rx does, unless that takes long.
+                // If two relays could each leave out a node, only the relay nearer to Rx does, unless that takes long.
                 let waits = !candidate.nearer && candidate.downstream;
                 let more = if waits {
                     settings.dead_after.times(2)
@@ -495,7 +496,7 @@ pub(crate) struct Candidate {
     pub(crate) downstream: bool,
     /// True if the candidate has selected this relay as its neighbour.
     pub(crate) pairs: bool,
-    /// True if the candidate is nearer in the chain than the selected neighbour.
+    /// True if the candidate is nearer to this relay than the selected neighbour.
     pub(crate) nearer: bool,
     /// True if the candidate reports that it fits between this relay and the selected neighbour.
     pub(crate) ready: bool,
@@ -506,8 +507,8 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, without the nearest node. That node is lost.
-    /// Each of the others could still answer, and delays the selection of the candidate.
+    /// Returns the number of nodes between this relay and the candidate, not counting the nearest. ¶ The nearest node
+    /// is lost. Each of the others could still answer, and so delays the selection of the candidate.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -520,8 +521,8 @@ impl Candidate {
 }
 
 impl Neighbour {
-    /// Returns true if the neighbour has changed since the last decision on a view. The change must be certain: the
-    /// search has ended without success, or the new neighbour is linked.
+    /// Returns true if the neighbour has changed since the last decision on a view. The change counts only once the new
+    /// neighbour is linked, or once the search has ended without success.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
@@ -560,8 +561,7 @@ impl Neighbour {
     }
 }
 
-/// Neighbour on one side according to the last decisions on views; 0 for none. A view is the agreed list of the chain's
-/// members.
+/// Neighbour on one side according to the last decisions on views, as node numbers; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view.
@@ -629,10 +629,10 @@ impl PendingHeartbeat {
 
 /// Number of consecutive hellos after which their sender is reported as not receiving this relay.
 ///
-/// A smaller number is possibly due to lost frames.
+/// A smaller number can result from lost frames.
 const NOT_RECEIVED: u8 = 8;
 
-/// Number of consecutive handshakes with another key after which their node is reported.
+/// Number of consecutive handshakes with a wrong key after which their sender is reported.
 const FORGED: u8 = 3;
 
 impl Neighbour {
@@ -686,7 +686,8 @@ impl Neighbour {
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` relays away. `taken` is true if it is the neighbour.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if this node is the selected
+    /// neighbour.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -716,21 +717,21 @@ impl Neighbour {
         self.not_received.count(distance, !received, NOT_RECEIVED)
     }
 
-    /// Returns true if another mission of the node `distance` relays away must be reported now.
+    /// Returns true if the wrong mission of the node `distance` relays away must be reported now.
     ///
     /// This is reported at most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.refusals.add_mission(distance, now)
     }
 
-    /// Returns the distances of the nearest nodes with another mission and with another key; 0 for none.
+    /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
     ///
     /// A refusal counts for one to two minutes. Only nodes fewer than `end` relays away count.
     pub(crate) fn refused(&self, now: Instant, end: u16) -> [u16; 2] {
         self.refusals.nearest(now, end)
     }
 
-    /// Counts a handshake with another key from the node `distance` relays away. Returns true once, after [`FORGED`]
+    /// Counts a handshake with a wrong key from the node `distance` relays away. Returns true once, after [`FORGED`]
     /// such handshakes in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16, now: Instant) -> bool {
         let is_news = self.forged.count(distance, true, FORGED);
@@ -740,7 +741,7 @@ impl Neighbour {
         is_news
     }
 
-    /// Resets the count of handshakes with another key. The node `distance` relays away has used the right key now.
+    /// Resets the count of wrong keys of the node `distance` relays away, which has used this relay's key.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
         self.refusals.remove_key(distance);

@@ -33,23 +33,24 @@ pub(super) enum PassKind {
     Turn(TurnPass),
 }
 
-/// Position that the joint method has computed for this relay.
+/// Lateral offset, altitude and maximum x that the joint method has computed for this relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
     /// Lateral offset and altitude that this relay has computed for itself.
     pub(super) cross_section: CrossSection,
-    /// Largest allowed x of this relay, m. Beyond it the later relays could not keep the minimum separation. Unused in
-    /// an interference field.
+    /// Largest allowed x of this relay, m. Beyond it the relays nearer to Rx could not keep the minimum separation.
+    /// Unused in an interference field.
     pub(super) end_m: f32,
-    /// True if every relay takes the farthest x that meets the target SIR. False if relays may stop before that x to
-    /// help the next hop.
+    /// True if every relay takes the farthest x that meets the target SIR.
+    ///
+    /// False if a relay may take a nearer x, which helps the next hop.
     pub(super) plain: bool,
 }
 
 /// Time slots of this relay, each as long as its hop needs. Unused if all slots are equal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
-    /// The relay's x in its joint solution, m, and its slots there, as fractions of the frame. `None` without a
+    /// This relay's x in the joint solution, m, and its slots at this x, as fractions of the frame. `None` without a
     /// solution.
     pub(super) solved: Option<(f32, SlotShares)>,
     /// Start and end of this relay's slots at the agreed positions, as fractions of the frame. `None` without an
@@ -70,7 +71,7 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True from the start of a pass along the chain until the statistics count it.
+    /// True from the start of a pass along the chain until it is counted in the statistics.
     pub(super) began: bool,
     /// Altitude and transmit power of this relay in the mission.
     pub(super) profile: Profile,
@@ -80,8 +81,8 @@ pub(crate) struct Computation {
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
-    /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. Algorithm 2 uses them as
-    /// the end of the hop from this relay.
+    /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. In Algorithm 2 they
+    /// describe the receiver of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
     /// Fitted time slots of this relay. Empty without the feature `altitude`.
@@ -92,8 +93,8 @@ pub(crate) struct Computation {
     /// Measurements of the unknown interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// Upper bound of the worst hop's SIR at the configured altitudes, linear, for any x. `None` except at the leader,
-    /// and until it is known.
+    /// Upper bound of the worst hop's SIR at the configured altitudes, linear, for any x. `None` until it is known, and
+    /// always at a relay other than the leader.
     pub(super) bound: Option<f32>,
 }
 
@@ -152,7 +153,7 @@ impl Computation {
     /// Restarts the leader's search for the best target SIR.
     pub(crate) fn restart(&mut self) {
         self.task.clear();
-        // With a new joint solution the leader tries the same targets as the first time.
+        // After a new joint solution the leader starts again from the first targets.
         self.chosen = None;
         self.state.plan();
     }
@@ -202,7 +203,7 @@ impl Computation {
     }
 
     /// Starts the search for the highest feasible target SIR with the targets in `ladder`. `None` stands for the usual
-    /// first targets. `last` is true if no other algorithm follows.
+    /// first targets. `last` is true if no other algorithm follows the search.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,
@@ -214,7 +215,7 @@ impl Computation {
 
     /// Starts the search for the target SIR at the configured lateral offsets and altitudes.
     ///
-    /// It follows if no target is feasible at those of the joint method.
+    /// This search follows if no target is feasible at the joint method's lateral offsets and altitudes.
     pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }
@@ -276,7 +277,7 @@ impl Computation {
         }
     }
 
-    /// Returns true if each relay computes for long before it forwards the current message along the chain.
+    /// Returns true if each relay computes for long before it forwards the message of the current pass.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
@@ -344,8 +345,8 @@ impl Computation {
         }
     }
 
-    /// Returns the number of completed rounds of Algorithm 2, and the SIR after the last one. `None` except at the
-    /// leader.
+    /// Returns the number of completed rounds of Algorithm 2, and the SIR of the chain after the last one. `None`
+    /// except at the leader.
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         match &self.task {
             LeaderTask::Adjusting(rounds) => Some((rounds.done(), rounds.sir)),
@@ -378,8 +379,7 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if no other algorithm follows this search.
         last: bool,
-        /// True for a search at the configured altitudes. The reason is that no target is feasible at those of the
-        /// joint method.
+        /// True for a search at the configured altitudes, because no target is feasible at the joint ones.
         given: bool,
     },
     /// Algorithm 2, in which the relays move one after the other.
@@ -415,8 +415,8 @@ impl Rounds {
         self.done
     }
 
-    /// Records the result of a pass of the token. Returns true if it was the last one. `any` is true if a relay has
-    /// moved. `sir` is the SIR of the chain's worst hop, linear.
+    /// Records the result of a pass of the token. Returns true if it was the last pass. `any` is true if any relay has
+    /// moved in it. `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -455,7 +455,7 @@ impl LeaderTask {
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
-    /// true for a search at the configured altitudes, because the joint method found none.
+    /// true for a search at the configured altitudes, because the joint method found no altitudes.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -473,26 +473,24 @@ impl LeaderTask {
 #[derive(Clone, Debug)]
 pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
-    /// Checksum of the previous relay's data, to recognise duplicates; see [`fingerprint`].
+    /// Checksum of the previous relay's data, by which duplicates are recognised; see [`fingerprint`].
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes of the joint method.
     pub(crate) chosen: bool,
-    /// True if a later relay has a power or fixed altitude that differs from the mission's. Later means in the
-    /// direction of the pass.
+    /// True if a relay farther along the sweep has a power or fixed altitude other than the mission's.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x at which the previous node meets each target SIR, m. It is the farthest in the direction of the
-    /// sweep.
+    /// Farthest x in the direction of the sweep at which the previous node meets each target SIR, m.
     from: PerTarget,
-    /// Farthest x at which this relay meets each target SIR, m. It is the farthest in the direction of the sweep.
+    /// Farthest x in the direction of the sweep at which this relay meets each target SIR, m.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
     /// The relay's x for the committed target SIR, m; `None` if no target is committed.
     place: Option<f32>,
-    /// x that the previous relay must take for the committed target SIR, m. `None` if that is its farthest x for the
-    /// target.
+    /// x that the previous relay must take for the committed target SIR, m. `None` if the previous relay takes its
+    /// farthest x for the target.
     required_x_m: Option<f32>,
 }
 
@@ -516,8 +514,8 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep with the data of the previous node. `behind` describes this node; `None` if it is Tx or Rx.
-    /// `from` is its farthest x for each target, m.
+    /// Starts this relay's part in a sweep, with the data of the previous node. ¶ `behind` describes the previous node;
+    /// `None` if that is Tx or Rx. `from` has the previous node's farthest x for each target, m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -529,8 +527,8 @@ impl SweepPass {
         self.required_x_m = None;
     }
 
-    /// Continues the computation of this relay's farthest x for each target. Returns true when it is complete. The last
-    /// relay then also decides which target is committed, if any.
+    /// Continues the computation of this relay's farthest x for each target. Returns true when it is complete. Then the
+    /// last relay also decides which target is committed, if any.
     ///
     /// Work: at most 16 targets; in an interference field 128 points of the field, or one target.
     pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
@@ -577,8 +575,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores this relay's x for the committed target SIR, `place`, m. From it follows the x that the previous relay
-    /// must take. If there is no such x, or `place` is `None`, the commitment is revoked.
+    /// Stores this relay's x for the committed target SIR, `place`, m. From `place` follows the x that the previous
+    /// relay must take. If no x is possible for that relay, or if `place` is `None`, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
@@ -642,7 +640,7 @@ impl SweepPass {
 
 /// Returns a checksum of the previous node's data in a sweep. `behind` is `None` if that node is Tx or Rx.
 ///
-/// The checksum distinguishes a duplicate from a sweep that a restarted relay sends with other data.
+/// The checksum distinguishes a duplicate from a new sweep with different data, which a restarted relay sends.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {
@@ -659,14 +657,14 @@ pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
 /// State of one relay while the token of Algorithm 2 travels along the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Task of the relays in this pass of the token: look, move or stop.
+    /// Action of every relay in this pass of the token: look, move or stop.
     pub(crate) turn: AdjustStep,
     /// SIR of the chain's worst hop before this pass of the token, linear.
     pub(crate) sir: f32,
     /// Position and power of the previous relay, the start of the hop to this relay; `None` for Tx.
     pub(super) before: Option<HopEnd>,
     search: Option<LocalSearch>,
-    /// True if this relay or a later one has moved in this pass of the token.
+    /// True if this relay, or a relay that had the token after it, has moved in this pass.
     pub(crate) any: bool,
     /// Worst SIR of the hops between this relay and Rx, linear.
     pub(crate) worst: f32,
@@ -685,7 +683,7 @@ impl TurnPass {
     }
 
     /// Starts a search for a better position around `at`. `band` is the lowest and the highest altitude, m. Returns
-    /// false if relays do not move in this pass of the token.
+    /// false, and does not search, if relays do not move in this pass of the token.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
@@ -719,7 +717,7 @@ pub(super) struct Seats {
     /// Number of relays whose profiles are known, counted from Tx. `None` before the first collection of profiles.
     pub(super) known: Option<u16>,
     /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it. The power is 0 if the relay
-    /// has the mission's common profile.
+    /// has the power and altitude of the mission's common profile.
     own: [[f32; 2]; MOST_SOLVED],
 }
 
@@ -729,7 +727,7 @@ impl Seats {
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// Returns the collected profile of relay `index`, or the mission's common profile if it has no other.
+    /// Returns the collected profile of relay `index`, or the common profile if none was collected for it.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);

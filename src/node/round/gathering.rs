@@ -63,7 +63,7 @@ impl Computation {
             return Action::Stale;
         }
         if roster.after > 0 && self.seats.known != Some(roster.after) {
-            // This relay has missed the message with the earlier profiles.
+            // This relay has missed the message that had the earlier profiles.
             return Action::Foreign;
         }
         self.state.accept(roster.number);
@@ -99,7 +99,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// Handles the collected profiles, received from the next relay.
+    /// Handles the result of the collection of profiles, received from the next relay.
     pub(crate) fn on_gathered(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let relays = context.mission().relays();
         if let PassKind::Gather(known) = &mut self.pass
@@ -136,7 +136,7 @@ impl Computation {
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues the joint solution while this relay waits for the leader's message.
+    /// Continues this relay's joint solution while it waits for the leader's next message.
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -161,8 +161,8 @@ impl Computation {
         }
     }
 
-    /// Continues this relay's joint solution of the chain. Returns the predicted target SIR, linear, once it is
-    /// complete; `None` before.
+    /// Continues this relay's joint solution of the chain. Returns the predicted target SIR, linear, once the solution
+    /// is complete; `None` before.
     ///
     /// If there is no solution, this relay uses its configured lateral offset and altitude, and the target is 0.
     #[inline(never)]
@@ -230,7 +230,7 @@ impl Computation {
     }
 
     /// Starts the search for the highest target SIR at the joint method's lateral offsets and altitudes. The first
-    /// targets are around `target`, linear, unless it is 0.
+    /// targets are near `target` (linear). If `target` is 0, they are the usual ones.
     pub(super) fn search_chosen(
         &mut self,
         context: &Context<'_>,

@@ -141,8 +141,8 @@ impl Round {
         }
     }
 
-    /// Carries out the action `next`, and returns the effects on the other layers. They include the sensing results
-    /// that differ from `before`.
+    /// Carries out the action `next`, and returns the effects on the other layers. The effects include the sensing
+    /// results that have changed since `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -238,8 +238,8 @@ impl Round {
         self.work_at = None;
     }
 
-    /// Resets the agreement on positions for a new view at `now`. `leads` is true at its leader. `works` is true if
-    /// this relay computes at once, as in the joint method.
+    /// Resets the agreement on positions for a new view at `now`. `leads` is true at the view's leader. `works` is true
+    /// if this relay starts to compute at once, as in the joint method.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -263,7 +263,7 @@ impl Round {
     }
 
     /// Returns the pending message for the next relay, and starts its retransmission timer. `None` if none is pending,
-    /// or if `reachable` is false (there is no next relay to receive it).
+    /// or if no next relay can receive it (`reachable` is false).
     pub(crate) fn poll_onward(
         &mut self,
         context: &Context<'_>,
@@ -276,8 +276,8 @@ impl Round {
         reachable.then_some(message)
     }
 
-    /// Returns the pending reply to the previous relay and marks it as sent. `None` if none is pending, or if
-    /// `reachable` is false (the previous relay cannot receive it).
+    /// Returns the pending reply to the previous relay and marks it as sent. `None` if none is pending, or if the
+    /// previous relay cannot receive it (`reachable` is false).
     pub(crate) fn poll_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
         match self.circulation.poll_reply().filter(|_| reachable)? {
             Reply::Result => self.computation.back(context),
@@ -365,8 +365,8 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Computation {
     /// Continues the computation for the current pass along the chain, or for the leader's next one.
     ///
-    /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten relays
-    /// of the joint method, or 624 positions of Algorithm 2.
+    /// Work, at most one of: 12 hops for 16 targets; 128 points of an uneven field, or all its points for one target;
+    /// ten relays of the joint method; 624 positions of Algorithm 2.
     fn work(&mut self, context: &Context<'_>) -> Action {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {

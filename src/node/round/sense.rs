@@ -24,17 +24,16 @@ use crate::sensing::sums::{Level, Levels, Sums, terms};
 use crate::time::Duration;
 use crate::wire::message::Heard;
 
-/// Maximum interval between two collections of measurements, as a multiple of [`Listen::every`].
+/// Maximum interval between two sensing passes, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// Number of collections without a change of the estimate after which their interval doubles. A collection gathers
-/// measurements along the chain.
+/// Number of sensing passes without a change of the estimate after which their interval doubles.
 const PATIENCE: u8 = 4;
 
-/// Number of collections of measurements per `Listen::every` in the search for a faulty sensor.
+/// Number of sensing passes in each `Listen::every` during the search for a faulty sensor.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
+/// After this number of consecutive measurements at or below the noise, a sensor may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
@@ -53,8 +52,8 @@ impl Computation {
                 .is_some_and(|sensor| !sensor.is_distributed)
     }
 
-    /// Returns true at a leader that may start a collection of measurements along the chain. The chain must have
-    /// agreed, or have no feasible target.
+    /// Returns true at a leader that may start a collection of measurements along the chain. The chain must have agreed
+    /// on positions, or have found no feasible target.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::is_sensing_enabled(context) && context.leads() && settled
@@ -113,7 +112,7 @@ impl Computation {
             return Action::Stale;
         };
         if hearing.estimate != sensor.estimate || !holds {
-            // With another estimate the positions will change.
+            // The estimate differs from the previous one, so the positions will change.
             sensor.estimate = hearing.estimate;
             self.task.clear();
             self.chosen = None;
@@ -269,10 +268,10 @@ impl Computation {
 
     /// Compares this relay's sensor with the measurements of all other relays.
     ///
-    /// A relay whose measurement is absurd excludes itself. A relay counts as deaf if it measures nothing, although the
-    /// other relays' measurements predict interference at its position. A relay that excluded itself earlier checks
-    /// whether its measurements now fit. Finally the relay adds its sums to the result, unless it has just excluded
-    /// itself.
+    /// A relay whose measurement is absurd excludes itself. A relay counts as deaf if it measures no interference where
+    /// the other relays' measurements predict some. A relay that excluded itself earlier checks whether its
+    /// measurements now agree with the others. Finally the relay adds its sums to the result, unless it has just
+    /// excluded itself.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,

@@ -25,7 +25,7 @@ use crate::node::circulation::LateMessages;
 pub enum Phase {
     /// No message of an agreement on positions has been received yet.
     Idle,
-    /// The leader computes the target SIRs that the chain tries next.
+    /// Leader only: it computes the target SIRs that the chain tries next.
     Planning,
     /// A message along the chain has been forwarded, and its result is not known yet.
     Waiting,
@@ -47,9 +47,9 @@ pub(crate) enum Action {
     Nothing,
     /// Ignore the received message, and count it as outdated.
     Stale,
-    /// Drop the message that awaits a reply, and continue the computation after a pause.
+    /// Stop awaiting a reply to the last message, and continue the computation after a pause.
     Work,
-    /// Continue the computation after a pause. A message that awaits a reply is kept.
+    /// Continue the computation after a pause. If a message awaits a reply, go on waiting.
     Think,
     /// Forward the message to the next relay, and retransmit it until there is a reply.
     Forward,
@@ -90,12 +90,13 @@ impl Arrival {
     }
 }
 
-/// Maximum number of passes along the chain by which a late message may be behind the current one. If it is farther
-/// behind, its leader has restarted.
+/// Maximum difference between the number of the current pass and that of a late message. A larger difference shows that
+/// the leader has restarted.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of the numbers of first passes along the chain. The first pass of a view, or after a leader's start, has a
-/// multiple of 64. No other pass has such a number. A relay can join a first pass without knowledge of earlier passes.
+/// Divisor of the pass numbers of first passes along the chain. The first pass of a view, or after a leader's start,
+/// has a multiple of 64. No other pass has such a number. A relay can join a first pass without knowledge of earlier
+/// passes.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.
@@ -204,8 +205,8 @@ impl RoundState {
         }
     }
 
-    /// Counts and classifies a late message. Too many in a row count as foreign, because the leader must have
-    /// restarted.
+    /// Counts and classifies a late message. After too many late messages in a row the result is foreign, because the
+    /// leader must have restarted.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign

@@ -11,7 +11,7 @@ use crate::settings::Method;
 use crate::wire::message::{Sweep, SweepVerdict};
 
 impl Computation {
-    /// Handles a sweep from the previous relay: a message along the chain that tries several target SIRs.
+    /// Handles a sweep message, which tries several target SIRs, from the previous relay.
     pub(crate) fn on_sweep(&mut self, context: &Context<'_>, sweep: &Sweep) -> Action {
         let behind = Behind {
             relay: sweep.relay,
@@ -30,7 +30,7 @@ impl Computation {
             return Action::Stale;
         }
         if sweep.chosen && self.seats.is_partial(context.mission().relays()) {
-            // This relay has missed the message with the profiles.
+            // This relay has missed the message that had the profiles.
             return Action::Foreign;
         }
         self.state.accept(sweep.number);
@@ -100,8 +100,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay takes its position for it.
-    /// Otherwise the leader continues its search.
+    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay takes its position for that
+    /// target. If none is, the leader continues its search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;
@@ -109,7 +109,8 @@ impl Computation {
         if let Some((x_m, target)) = sweep_pass.agreed() {
             let chosen = sweep_pass.chosen;
             if let LeaderTask::Searching { search, given, .. } = &self.task {
-                // The result at some lateral offsets and altitudes is no bound for chains with other ones.
+                // The result at some lateral offsets and altitudes is no bound for chains with different offsets and
+                // altitudes.
                 let most = search.most(&sweep_pass.verdict.slacks);
                 self.bound = most.filter(|_| !chosen && !given);
             }
@@ -151,7 +152,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Completes the agreement on a target SIR, or starts the next algorithm of the settings' method.
+    /// Completes the agreement on positions, or starts the next algorithm of the configured method.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
         self.state.hold();
         if let LeaderTask::Searching { last: false, .. } = self.task {

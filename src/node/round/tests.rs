@@ -1,4 +1,4 @@
-//! Tests of the agreement with three relays: proofs that a neighbour is alive, outstanding messages.
+//! Tests of the agreement with three relays: proofs of a live neighbour, messages that await replies.
 
 extern crate std;
 
@@ -87,7 +87,7 @@ impl Line {
     }
 }
 
-/// Delivers messages between the relays until `ends` returns true for one. Returns the delivered messages.
+/// Delivers messages between the relays until `ends` returns true for a message. Returns the delivered messages.
 fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
     let mut all = Vec::new();
     for _ in 0..100_000 {

@@ -112,8 +112,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Ends this relay's part in a pass of Algorithm 2, and prepares its reply. The reply has the worst SIR of the hops
-    /// from this relay to Rx. `worst` is the worst SIR of the hops from the next relay to Rx, linear.
+    /// Ends this relay's part in a pass of Algorithm 2, and prepares its reply. The reply contains the worst SIR of all
+    /// hops from this relay to Rx. `worst` is the worst SIR of the hops from the next relay to Rx, linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,

@@ -28,13 +28,13 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum increase of the latest known view number by one message. One message thus cannot use up all numbers.
+/// Maximum increase of the latest known view number by one message. So no single message can use up all numbers.
 const MAX_ADVANCE: u32 = 4096;
 
 /// State of one relay in view changes, by which the relays agree on the members of the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    /// Progress of the view proposal along the chain. `Outstanding` while the decision is awaited.
+    /// Progress of the view proposal along the chain. Its stage is `Outstanding` while the decision is awaited.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
@@ -102,8 +102,8 @@ impl ViewChange {
         self.newest
     }
 
-    /// Records that another relay knows `view`. The latest known view advances by at most [`MAX_ADVANCE`] numbers,
-    /// because one message could otherwise use up all of them. A relay that was away for long receives `view`
+    /// Records that another relay knows `view`. The latest known view number advances by at most [`MAX_ADVANCE`],
+    /// because one message could otherwise use up all numbers. A relay that was away for long receives `view`
     /// repeatedly, and so catches up.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
@@ -130,8 +130,8 @@ impl ViewChange {
         self.proposed
     }
 
-    /// Returns this relay's rank in the last view proposal, and its number of relays. Rank 1 is the leader. `None`
-    /// without a proposal.
+    /// Returns this relay's rank in the last view proposal, and the number of relays in that proposal. Rank 1 is the
+    /// leader. `None` without a proposal.
     pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
@@ -214,9 +214,9 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on the proposed `view`, and returns the effects on the other layers. `place` relays have voted before;
-    /// their votes are `received`, `None` at the proposer. Returns `None` if this relay has already promised (Paxos)
-    /// `view` or a later view.
+    /// Votes on the proposed `view`, and returns the effects on the other layers. `place` relays have voted before this
+    /// one; their votes are `received`, which is `None` at the proposer. Returns `None` if this relay has already
+    /// promised (Paxos) `view` or a later view.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -258,8 +258,8 @@ impl ViewChange {
     /// Decides the outstanding view proposal, because this relay is the last one that can be reached. All reachable
     /// relays have voted on it.
     ///
-    /// If the proposal has been forwarded before, a later view is requested instead, because two different views with
-    /// the same identifier could result.
+    /// If this relay has already forwarded the proposal, it requests a later view instead, because two different views
+    /// with the same identifier could result.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
         let Some(proposed) = self.outstanding() else {
             return Effects::NONE;
@@ -350,7 +350,7 @@ impl ViewChange {
         proposed.usable_in = usable_in;
         let leads = proposed.rank == 1;
         if leads && accepted.is_some() {
-            // All other members have accepted the view before.
+            // All other members have already accepted the view.
             self.electorate.commit();
         }
         self.refused = accepted.is_none();
@@ -358,7 +358,7 @@ impl ViewChange {
         self.circulation.complete(context.now, path);
         self.request.stop();
         if leads && accepted.is_none() {
-            // By this decision relays have learned of a newer view, so they can vote on the next proposal at once.
+            // From this decision relays have learned of a newer view, so they can vote on the next proposal.
             if has_newer_base {
                 self.request.request_now(context.now);
             } else {
@@ -509,8 +509,8 @@ pub(crate) struct Proposed {
     pub(crate) rank: u16,
     /// Votes on the proposed view, including this relay's vote.
     pub(super) poll: Poll,
-    /// Node to which the proposal was forwarded; `None` until then. It is never sent to a second node, because two
-    /// views with the same identifier could result.
+    /// Node to which the proposal was forwarded; `None` until then. The proposal is never sent to a second node,
+    /// because two views with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
     /// View that the decided view replaces. Before the decision: the newest view known to be agreed on.
     pub(crate) base: View,
@@ -549,13 +549,13 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive refusals of view proposals, for lack of a quorum.
     refusals: u8,
-    /// Earliest time of a view request for a new reason after a refusal. `None` if a new reason does not make the
+    /// Earliest time of a view request for a new reason after a refusal. `None` if a new reason must not make the
     /// request earlier.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
 
-/// Maximum number of times that the wait before a new view request doubles after consecutive refusals.
+/// Maximum number of doublings of the wait before a new view request, after consecutive refusals.
 const DOUBLINGS: u8 = 3;
 
 impl ViewRequest {
@@ -574,8 +574,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, and repeats the request until a view is decided. After a refusal it shortens the wait, because
-    /// there is a new reason for a view.
+    /// Requests a view, and repeats the request until a view is decided. If a view was refused before, the new reason
+    /// shortens the wait.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);
@@ -603,7 +603,7 @@ impl ViewRequest {
         }
     }
 
-    /// Requests a view after about `wait`. Consecutive refusals double the wait up to three times.
+    /// Requests a view after about `wait`. Each of the first three consecutive refusals doubles the wait.
     ///
     /// [`request_now`](Self::request_now) ends the doubling.
     pub(super) fn request_after_refusal(&mut self, now: Instant, wait: Duration) {
@@ -631,8 +631,8 @@ impl ViewRequest {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer of view requests. Returns true if the relay must send a request: it is already
-    /// pending, or this relay is `fresh` (no agreement or view since its start).
+    /// Handles the expired timer of view requests. Returns true if this relay must send a request: one is pending, or
+    /// this relay is `fresh` (no agreement or view since its start).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {

@@ -55,7 +55,7 @@ pub(crate) struct Electorate {
     /// True if this relay is a member of the view `agreed`, so that its vote counts.
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// View that this relay has accepted without knowing that it is agreed on; `None` if there is none.
+    /// View that this relay has accepted, but not yet known to be agreed on; `None` if there is none.
     pub(super) accepted: Option<Successor>,
     /// Proposals that this relay has voted on and that can still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
@@ -113,7 +113,7 @@ impl Electorate {
         }
         let newer = self.agreed.id > received.agreed.id;
         let before = if newer {
-            // As far as they know, earlier voters were not members of the newer view.
+            // The earlier voters did not know the newer view, so they voted as nodes that are not its members.
             Poll::of(self.agreed)
         } else {
             received
@@ -155,8 +155,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view `proposal`. A full list keeps the earliest four and the latest four votes,
-    /// including the new one.
+    /// Records the vote on the view `proposal`. If the list is full, the earliest four and the latest four votes
+    /// remain, including the new one.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -174,7 +174,7 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Removes the votes on proposals for which `is_decided` returns true. They can no longer become views.
+    /// Removes the votes on proposals for which `is_decided` returns true. Such proposals can no longer become views.
     fn forget(&mut self, is_decided: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
         let voted = self.voted.iter().filter(|voted| !is_decided(**voted));
@@ -217,8 +217,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. It is at most `most`, and
-/// `most` if unknown.
+/// Returns the time until positions of the next view may be used, in tenths of a second. The time is at most `most`; if
+/// it is unknown, it is `most`.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
@@ -226,7 +226,7 @@ pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
 }
 
 /// Returns the view decided on `proposal` with the votes `poll`; `None` without a quorum. The proposal has reached
-/// `relays` of the mission's `all` relays.
+/// `relays` out of the `all` relays of the mission.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,
@@ -235,7 +235,7 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
     if relays == all {
         return Some(whole);
     }
-    // Of two equal halves, the half with the view's proposer counts as the larger.
+    // If the members split into two equal halves, the half with the view's proposer counts as the larger.
     let weight = 2 * u32::from(poll.votes) + u32::from(poll.proposer);
     if weight <= u32::from(poll.agreed.relays) {
         return None;
@@ -246,7 +246,7 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
-    /// Test helper: disables the quorum rule, so that the model check can show that it finds this fault.
+    /// Test helper: disables the quorum rule, so that a test shows that the model check finds it.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;

@@ -216,7 +216,7 @@ pub(super) struct Chain {
     pub(super) relays: Vec<RelayState>,
     /// Part number of each relay while links are cut. Relays with equal numbers receive each other.
     pub(super) parts: Vec<u8>,
-    /// Sent frames that can still arrive, sorted and without duplicates.
+    /// Frames in transit, which can still arrive; sorted and without duplicates.
     pub(super) air: Vec<Frame>,
     /// Views that were ever decided on.
     pub(super) decided: Vec<DecidedView>,
@@ -243,7 +243,7 @@ pub(super) enum ModelEvent {
     Passes(usize),
     Reboots(usize),
     Forgets(usize),
-    /// The relay with this list index leaves the chain, or joins it again.
+    /// Relay with this list index: it leaves the chain, or joins it again.
     Moves(usize),
 }
 
@@ -345,10 +345,10 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Broken rule, for a test: all other relays at once count a departure as agreed on.
+    /// Broken rule, for a test: a departure reduces the quorum at all other relays at once.
     Inside,
-    /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view known to one of
-    /// them.
+    /// Broken rule, for a test: every reachable relay votes. The quorum is that of the newest view that any of them
+    /// knows.
     Everybody,
 }
 
@@ -426,7 +426,7 @@ impl Check {
         }
     }
 
-    /// Returns the relays that have voted on the view `proposal` as a bit mask; bit 0 is the first relay.
+    /// Returns a bit mask of the relays that have voted on the view `proposal`; bit 0 is the first relay.
     pub(super) fn voters(chain: &Chain, proposal: ViewId) -> u8 {
         let voters = chain.relays.iter().zip(0..);
         let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
@@ -590,8 +590,8 @@ impl Check {
 }
 
 impl Check {
-    /// Returns true if the agreed views form one sequence. Each of them replaces the initial view or another agreed
-    /// view, and no two of them replace the same view.
+    /// Returns true if the agreed views form one sequence. Each agreed view must replace the initial view or another
+    /// agreed view, and no two may replace the same view.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {
             let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
@@ -617,8 +617,8 @@ impl Check {
     }
 
     /// Returns true if every view that a relay knows as agreed on is in the list of agreed views. Such a view must also
-    /// have at most as many members as its number of relays. A member is a relay that has a vote in this view, and
-    /// knows it as the newest agreed view.
+    /// have at most as many voting members as it has relays. A voting member has a vote in this view, and knows no
+    /// newer agreed view.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {
@@ -634,7 +634,7 @@ impl Check {
     }
 }
 
-/// Maximum number of proposals that a chain is allowed to need for a view once its links are restored.
+/// Maximum number of proposals until the chain must have agreed on a view, once its links are restored.
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {
@@ -656,8 +656,8 @@ impl Check {
         }
     }
 
-    /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. They must
-    /// also be a quorum of every later decided view.
+    /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. The relays
+    /// must also be a quorum of every view that was decided later.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.relays.len()).filter(known);
@@ -676,7 +676,7 @@ impl Check {
 
     /// Returns the number of proposals until the relays in the bit mask `there` agree on a view.
     ///
-    /// The members of this view are exactly these relays, and only the links between them work. If `keeps_air` is true,
+    /// The members of the view must be exactly these relays. Only the links between them work. If `keeps_air` is true,
     /// frames in transit are still delivered; otherwise they are lost. Returns `Some(0)` if the relays are no quorum,
     /// and `None` if [`MAX_PROPOSALS`] are not enough.
     pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
@@ -761,7 +761,7 @@ impl Model for Check {
                 actions.push(ModelEvent::Moves(at));
             }
             if chain.outside >> at & 1 == 1 {
-                // The relay is silent until it returns to the chain.
+                // The relay sends nothing until it returns to the chain.
                 continue;
             }
             if chain.proposals > 0 && chain.before(at).is_none() {

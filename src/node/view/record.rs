@@ -28,11 +28,11 @@ pub struct ViewRecord {
     electorate: Electorate,
 }
 
-/// Reason why a stored record is rejected.
+/// Reason why a stored record of votes is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// The relay that wrote the record had loaded another mission.
+    /// The relay that wrote the record had loaded a different mission.
     Base,
     /// The relay has already started, so the votes can no longer be restored.
     Begun,
@@ -43,8 +43,8 @@ error_texts!(RecordError {
     Begun => "the record of votes must be restored before the relay starts",
 });
 
-/// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash of an
-/// iterator over all bytes.
+/// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash that an
+/// iterator over all bytes would need.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -113,7 +113,7 @@ impl ViewRecord {
         }
     }
 
-    /// Returns the votes in the record; `None` if it belongs to another mission.
+    /// Returns the votes in the record; `None` if it belongs to a different mission.
     ///
     /// The loaded mission has the digest `base`, `relays` relays and the leader `initial_leader`.
     pub(super) fn electorate(
@@ -232,7 +232,7 @@ mod tests {
         ViewId::from_bits(number << 10 | node)
     }
 
-    /// Returns the voting state of a relay that has accepted a view and voted on two later proposals.
+    /// Returns the voting state of a relay that has accepted a view and then voted on two proposals.
     fn busy() -> Electorate {
         let mut electorate = Electorate::new(3, 1);
         let first = view(1, 1);

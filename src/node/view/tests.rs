@@ -58,14 +58,14 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Makes this relay the last one that can be reached, so that it decides the outstanding proposal.
+    /// Makes this relay the last reachable one, so that it decides the outstanding proposal.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
         self.view.decide(&context)
     }
 
-    /// Makes this relay the leader: no relay precedes it, and it must send its view request.
+    /// Makes this relay the leader, which has no previous relay, and lets its view request fall due.
     pub(super) fn leads(&mut self) -> Effects {
         self.view.request.start(self.now);
         self.now = self.view.request.next_timeout().unwrap();
@@ -192,8 +192,8 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// Checks that a second proposal of the same view for another mission is no duplicate. The leader has restarted in
-/// between, and has received another mission.
+/// Checks that a second proposal of the same view, but with a different mission, is no duplicate. ¶ Between the two
+/// proposals the leader has restarted and received that mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -346,7 +346,7 @@ fn a_refusal_names_the_agreed_view() {
             );
             assert_eq!(second.view.electorate.agreed(), view);
         } else {
-            // Both relays now know the view, so two of its three members vote.
+            // Both relays now know the view, so two of the view's three members vote.
             assert!(matches!(
                 decided,
                 Some(LayerEvent::ProposalDecided(ProposalOutcome::Granted {
@@ -377,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a relay ignores the decision on a view with an older mission than its stored one.
+/// Checks that a relay ignores the decision on a view with an older mission than it has stored.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();
@@ -450,7 +450,7 @@ fn a_forwarded_proposal_without_a_next_relay_is_abandoned() {
         assert!(relay.view.request.is_pending());
         assert_eq!(relay.view.latest_view(), id(2, 2), "one number more, once");
     }
-    // Relay 2 may decide a later proposal as the last relay.
+    // Relay 2 may decide a later proposal if it is the last relay then.
     let later = relay.proposal(id(3, 1));
     assert!(relay.handle(&later).event.is_some());
 }
@@ -470,7 +470,7 @@ fn a_proposal_is_forwarded_to_only_one_node() {
     assert!(relay.view.request.is_pending());
     relay.view.resend();
     assert!(relay.onward(2).is_some(), "it may be back");
-    // A later proposal may be forwarded to the other node.
+    // A later proposal may be forwarded to node 4.
     let mut later = relay.leads();
     for _ in 0..4 {
         if later.began {
@@ -505,7 +505,7 @@ fn a_leader_proposes_later_views_one_at_a_time() {
     relay.view.observe_view(id(8, 2));
     assert!(relay.leads().began);
     assert_eq!(relay.view.latest_view(), id(9, 1));
-    // The latest known view approaches a view far ahead in steps.
+    // The number of the latest known view approaches a much larger view number in steps.
     for number in [4_105, 8_201, 9_000, 9_000] {
         relay.view.observe_view(id(9_000, 3));
         assert_eq!(relay.view.latest_view(), id(number, 3));
@@ -525,7 +525,7 @@ fn a_refused_lone_leader_proposes_only_with_a_quorum() {
         assert!(relay.view.has_no_quorum() && relay.view.request.is_pending());
     }
     assert_eq!(relay.view.latest_view(), newest);
-    // With a next relay the vote may have another result.
+    // With a next relay the vote may give a quorum.
     relay.end = false;
     let began = (0..8).any(|_| relay.leads().began);
     assert!(began && relay.view.latest_view() > newest);

@@ -38,7 +38,7 @@ struct Served<U: Instance> {
 static UPSTREAM: Mutex<RefCell<Option<Served<USART2>>>> = Mutex::new(RefCell::new(None));
 static DOWNSTREAM: Mutex<RefCell<Option<Served<USART3>>>> = Mutex::new(RefCell::new(None));
 
-/// Milliseconds since the start. They overflow after 49 days.
+/// Milliseconds since the start. The count overflows after 49 days.
 static MILLIS: AtomicU32 = AtomicU32::new(0);
 
 #[entry]
@@ -79,7 +79,7 @@ fn main() -> ! {
             end: down_end,
         }));
     });
-    // SAFETY: both drivers are in place, and no critical section relies on one masked interrupt.
+    // SAFETY: both drivers are in place, and no critical section relies on a single masked interrupt.
     unsafe {
         NVIC::unmask(Interrupt::USART2);
         NVIC::unmask(Interrupt::USART3);
@@ -93,7 +93,7 @@ fn main() -> ! {
     let seed = u32::from(id.x()) << 16 ^ u32::from(id.y()) ^ u32::from(id.waf_num()) << 8;
     let mut relay = Relay::new(MISSION, IDENTITY, Settings::wires(BAUD), seed, now()).unwrap();
     loop {
-        // This board stores no votes: after a reboot in flight leave the relay off.
+        // This board stores no votes. So leave the relay off after a reboot in flight.
         ports.poll(now(), &mut relay, |_| true);
         while let Some(event) = relay.poll_event() {
             if event == Event::SetpointChanged {
@@ -101,7 +101,7 @@ fn main() -> ! {
                 led.set_state(relay.setpoint().is_none().into());
             }
         }
-        // Returns at the next byte, or at the next millisecond.
+        // The call returns at the next byte, or at the next millisecond.
         cortex_m::asm::wfi();
     }
 }

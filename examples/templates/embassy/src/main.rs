@@ -45,7 +45,7 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Static storage of the relay, about 10 KB, which would be too large for the stack.
+/// Static storage of the relay: about 10 KB, too large for the stack.
 static RELAY: StaticCell<Option<Relay>> = StaticCell::new();
 static SENT: StaticCell<[u8; 256]> = StaticCell::new();
 static RECEIVED: StaticCell<[u8; 256]> = StaticCell::new();
@@ -103,7 +103,7 @@ async fn main(_spawner: Spawner) {
             }
         }
     };
-    // This board stores no votes: after a reboot in flight leave the relay off.
+    // This board stores no votes. So leave the relay off after a reboot in flight.
     join(ports.run(&relay, &EmbassyClock, |_| true), firmware).await;
 }
 

@@ -39,7 +39,7 @@ mod app {
         end: InterruptEnd<'static>,
     }
 
-    /// Interrupt of a UART, to be set pending so that it sends.
+    /// Interrupt of a UART. It is set pending to start a transmission.
     pub struct Request(Interrupt);
 
     impl Pend for Request {
@@ -110,7 +110,7 @@ mod app {
             ports, relay, led, ..
         } = cx.local;
         loop {
-            // This board stores no votes: after a reboot in flight leave the relay off.
+            // This board stores no votes. So leave the relay off after a reboot in flight.
             ports.poll(now(), relay, |_| true);
             while let Some(event) = relay.poll_event() {
                 if event == Event::SetpointChanged {
@@ -118,7 +118,7 @@ mod app {
                     led.set_state(relay.setpoint().is_none().into());
                 }
             }
-            // Returns at the next byte, or after at most a millisecond.
+            // The call returns at the next byte, or after at most a millisecond.
             rtic::export::wfi();
         }
     }

@@ -57,7 +57,7 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
 
 /// Replaces each row such as `as bytes 1 to 18 of a Sweep` with the rows of that message's table.
 ///
-/// `known` has the tables of the earlier messages.
+/// `known` has the tables of the messages before this one.
 fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in rows {
@@ -147,7 +147,7 @@ fn kind(row: &Row, tables: &[Table<'_>]) -> Result<Kind, String> {
     if let ("u8", Some(words)) = (row.kind.as_str(), words(&row.field)) {
         return Ok(Kind::Words(words));
     }
-    // Such as `ten f32`.
+    // The type is, for example, `ten f32`.
     if let Some((_, of)) = row.kind.split_once(' ') {
         let of = plain(of)?;
         let bytes = last_number(&row.size).ok_or("an array without a size")?;

@@ -45,7 +45,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Returns the size of this type, bytes; 0 if it varies.
+    /// Returns the size of this type, bytes; 0 if the size varies.
     pub const fn size(&self) -> usize {
         match self {
             Self::U8 | Self::Bool | Self::Flags(_) | Self::Words(_) => 1,
@@ -107,7 +107,8 @@ impl Format {
 }
 
 impl Field {
-    /// Returns factor and base unit: (10, "s") for a unit of 0.1 s. `None` for a unit without a factor.
+    /// Returns factor and base unit: (10, "s") for a unit of 0.1 s. `None` if the unit is a base unit, without a
+    /// factor.
     pub fn scale(&self) -> Option<(f64, &str)> {
         let (number, base) = self.unit.split_once(' ')?;
         let multiple: f64 = number.parse().ok()?;

@@ -53,7 +53,7 @@ pub fn text(shown: &Shown<'_>) -> String {
         _ = write!(out, "  ({})", packet.comment);
     }
     out.push('\n');
-    // Ranges are printed if a number is out of range.
+    // The ranges of all fields are printed if any number is out of range.
     let ranges = frame.refusal == Some(Refusal::Range);
     lines(&frame.fields, 4, ranges, &mut out);
     if frame.refusal.is_some() {
@@ -125,7 +125,7 @@ fn value_text(field: &Field, value: &Value<'_>) -> String {
     }
 }
 
-/// Returns the number as text. With a unit such as 0.1 s the value in base units follows: `50 (5 s)`.
+/// Returns the number as text. If the unit has a factor, such as 0.1 s, the value in base units follows: `50 (5 s)`.
 fn scaled(field: &Field, text: String, number: f64) -> String {
     match field.scale() {
         Some((per, base)) => format!("{text} ({} {base})", number / per),

@@ -17,7 +17,7 @@ use super::{Item, Packet, SourceError};
 struct Interface {
     name: String,
     is_ours: bool,
-    /// Time resolution of the interface in the file: n means 10^-n s, 128 + n means 2^-n s.
+    /// Time resolution of the interface's timestamps: n means 10^-n s, 128 + n means 2^-n s.
     resolution: u8,
 }
 
@@ -107,7 +107,7 @@ fn pieces<E>(
             _ => {}
         }
     }
-    // Bytes that were not captured count for the last piece.
+    // Bytes that were not captured count as part of the last frame.
     let missing = usize::try_from(packet.original_len)
         .unwrap_or(usize::MAX)
         .saturating_sub(packet.data.len());

@@ -45,7 +45,7 @@ pub enum SourceError<E> {
     Read(io::Error),
     /// Malformed capture, with the fault.
     Capture(String),
-    /// Error of the caller's function `take`; it ended the reading.
+    /// Error that the caller's function `take` has returned, which ended the reading.
     Taken(E),
 }
 
@@ -57,7 +57,7 @@ pub fn read<E>(
     mut input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,
 ) -> Result<(), SourceError<E>> {
-    // Reads no more bytes than needed, because no more than one frame may come.
+    // Reads only the necessary bytes, because the input may have no second frame.
     let mut begin = Vec::new();
     while begin.len() < CAPTURE.len() && CAPTURE.starts_with(&begin) {
         let mut byte = [0];

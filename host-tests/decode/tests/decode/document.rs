@@ -36,7 +36,7 @@ fn the_reason_of_every_rejected_stream_is_shown() {
     let (mut stream, mut counted) = (Vec::new(), Vec::new());
     for vector in Vectors::load().unwrap().rejected {
         stream.extend(vector.wire);
-        // Counters of frames that are intact but not accepted.
+        // The counters are for frames that are intact but not accepted.
         let on_top = [
             "mission",
             "view",
@@ -58,10 +58,10 @@ fn the_reason_of_every_rejected_stream_is_shown() {
             "oversized" => why == "oversized",
             "truncated" => why == "truncated" || why == "short",
             "crc" => why == "crc",
-            // The decoder accepts signed frames in every network.
+            // The decoder accepts signed frames with any network number.
             "version" => why == "version" || line["tag"].is_object(),
             "malformed" => ["malformed", "range", "unknown_tag"].contains(&why),
-            // Only a receiver detects the other reasons.
+            // The remaining reasons can be detected only by a receiver.
             _ => why == "none",
         };
         assert!(fits, "{counted}: {line}");

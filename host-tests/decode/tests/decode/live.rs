@@ -1,4 +1,4 @@
-//! Tests of live input: each frame is printed at once, also between noise and into a pipe that closes.
+//! Tests of live input: each frame is printed at once, also amid noise, and if the reader closes the pipe.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::Stdio;
@@ -72,7 +72,7 @@ fn a_closed_standard_output_ends_it_without_an_error() {
         let mut child = decode().args(arguments).spawn().unwrap();
         drop(child.stdout.take());
         let mut input = child.stdin.take().unwrap();
-        // The reader may close before everything is written.
+        // The reader may close the pipe before everything is written.
         let frames = HEARTBEAT.repeat(10_000);
         _ = input.write_all(&frames);
         drop(input);

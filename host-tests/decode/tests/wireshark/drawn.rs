@@ -8,7 +8,7 @@ use uav_relay_decode::envelope::{before, sealed, stuffed};
 use uav_relay_decode::format::Format;
 use uav_relay_decode::write::write_fields;
 
-/// Returns a random frame with the message tag `kind`; a handshake if `kind` is the number of tags.
+/// Returns a random frame with the message tag `kind`. If `kind` equals the number of tags, it is a handshake.
 pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let (layout, flags, mut body) = match format.messages.get(kind) {
         Some(message) => (
@@ -26,7 +26,7 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
 
 /// Returns a frame with this body and a random header with the flags `flags`.
 ///
-/// With flags 0 it has no tag, otherwise a random one.
+/// With flags 0 the frame has no authentication tag, otherwise a random one.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let header = Header {
         network: rng.random(),
@@ -41,7 +41,7 @@ pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     stuffed(&sealed(plain))
 }
 
-/// Damages a frame at random: changes, removes or adds bytes, or cuts the end.
+/// Damages a frame at random: changes, removes or adds bytes, or cuts off the end.
 pub(crate) fn hurt(mut wire: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(0..wire.len() - 1);
     match rng.random_range(0..5) {

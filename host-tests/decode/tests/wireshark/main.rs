@@ -130,12 +130,12 @@ fn tshark_and_cargo_decode_reject_for_the_same_reason() {
             drawn::hurt(wire, &mut rng)
         })
         .collect();
-    // Invalid bodies: random bytes with a valid CRC.
+    // These bodies are invalid: random bytes, with a valid CRC.
     frames.extend((0..HURT).map(|_| {
         let body: Vec<u8> = (0..rng.random_range(0..40)).map(|_| rng.random()).collect();
         drawn::around(&body, rng.random_range(0..4), &mut rng)
     }));
-    // Too few bytes for header and CRC.
+    // These frames have too few bytes for header and CRC.
     frames.extend((1..14).map(|len| [&[len + 1][..], &vec![7; len.into()], &[0]].concat()));
     frames.extend(rejected());
     let packets = dissected(&frames);
@@ -143,7 +143,7 @@ fn tshark_and_cargo_decode_reject_for_the_same_reason() {
     for (bytes, packet) in frames.iter().zip(&packets) {
         let whole = bytes.strip_suffix(&[0]);
         if whole.unwrap_or(bytes).contains(&0) || bytes == &[0] {
-            // Packet with several pieces; `cargo decode` shows each.
+            // A packet has several pieces, and `cargo decode` shows each of them.
             continue;
         }
         let refusal = frame::read(&format, bytes, bytes.len()).refusal;

@@ -79,7 +79,7 @@ pub(crate) struct Wanted<'f> {
 
 /// Returns the fields that Wireshark should show for a message, in order. Their names begin with `prefix`.
 ///
-/// The count of a list and each flag of a flags byte are fields, too.
+/// The count of a list is a field as well, and so is each flag of a flags byte.
 pub(crate) fn flat<'f>(prefix: &str, fields: &Fields<'f>) -> Vec<Wanted<'f>> {
     let mut all = Vec::new();
     for (field, value) in &fields.0 {
@@ -122,7 +122,7 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 impl Wanted<'_> {
-    /// Asserts that Wireshark shows this field. Compares bytes where Wireshark rounds to six digits.
+    /// Asserts that Wireshark shows this field. Where Wireshark rounds to six digits, the bytes are compared.
     pub(crate) fn is(&self, shown: &Shown) {
         assert_eq!(shown.name, self.name);
         let show = shown.show.as_str();

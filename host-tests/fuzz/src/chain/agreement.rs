@@ -6,8 +6,8 @@ use super::{Chain, Member};
 
 /// Maximum number of rounds until all relays agree. In a round each relay receives one frame.
 ///
-/// In the slowest agreement, the relays first do not use links that were lost repeatedly, for some minutes of virtual
-/// time. Then 24 passes go along 4 relays.
+/// In the slowest agreement, the relays at first do not use repeatedly lost links for some minutes of virtual time.
+/// Then 24 passes go along 4 relays.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
@@ -18,7 +18,7 @@ impl Chain {
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {
-            // Such a schedule takes ten thousand sweeps.
+            // A schedule of fixed steps takes ten thousand sweeps.
             return;
         }
         for member in &mut self.members {

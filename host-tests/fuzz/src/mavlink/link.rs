@@ -21,9 +21,8 @@ const MAX_OPERATIONS: usize = 256;
 
 /// Maximum number of frames that the link may send per cycle. With more it seems never to stop.
 ///
-/// It is twice 13: heartbeat, three message requests, command answer, flight target, three status texts and four
-/// named values; a TIMESYNC can be added.
-/// texts and four named values. A clock request (TIMESYNC) can come in addition.
+/// It is twice 13: heartbeat, three message requests, command answer, flight target, three status texts and four named
+/// values. A clock request (TIMESYNC) can come in addition.
 const MAX_FRAMES: usize = 26;
 
 /// Maximum distance of a flight target from the line Tx-Rx, m.
@@ -190,8 +189,8 @@ impl Link {
         }
     }
 
-    /// Delivers a frame of the autopilot to the link. If the link requires signatures, `input` chooses if it is
-    /// right.
+    /// Delivers a frame of the autopilot to the link. If the link requires signatures, `input` decides if the frame's
+    /// signature is right.
     fn deliver_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) {
         match &mut self.peer {
             Some(peer) => {
@@ -202,7 +201,7 @@ impl Link {
         }
     }
 
-    /// Delivers bytes to the link in one piece, and to a copy in pieces. The results must be equal.
+    /// Delivers bytes to the link in one piece, and to a copy of the link in many pieces. The results must be equal.
     ///
     /// The pieces have two alternating lengths.
     fn deliver_bytes(&mut self, bytes: &[u8], lengths: u16) {
@@ -315,7 +314,7 @@ impl Link {
                 Some(peer) => {
                     assert_eq!(frame.get(2), Some(&1));
                     let unsigned = peer.check_sent(self.now, &frame);
-                    // The checksum covers the flag of a signed frame.
+                    // The checksum also covers the flag that marks a signed frame.
                     self.check_frame(&unsigned, 1);
                 }
                 None => self.check_frame(&frame, 0),
@@ -344,7 +343,7 @@ impl Link {
                 AutopilotEvent::LostCleared { .. } | AutopilotEvent::ClearRefused { .. }
             );
             events += 1;
-            // At most eight events, and four kinds of mistrust.
+            // There may be at most eight events, and four kinds of `Mistrust`.
             assert!(events <= 12, "it never ends");
         }
         assert!(tells || cleared.is_none(), "cleared without a word");
@@ -407,7 +406,7 @@ impl Link {
             velocity.iter().all(|part| part.abs() <= 20.5),
             "{velocity:?}"
         );
-        // On a flat earth.
+        // The distance is computed on a flat earth.
         let [north_m, east_m] = DEGREE_M;
         let toward =
             |[to_lat, to_lon, _]: [f64; 3]| [(to_lat - TX[0]) * north_m, (to_lon - TX[1]) * east_m];
@@ -433,7 +432,7 @@ fn nearby_place(input: &mut Input<'_>) -> Placement {
     }
 }
 
-/// Reads a position near the line Tx-Rx. Sometimes a coordinate is an arbitrary number.
+/// Reads a position near the line Tx-Rx. In some cases a coordinate is an arbitrary number.
 fn any_place(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, 1_400.0)),

@@ -15,16 +15,16 @@ const OTHER: [u8; 32] = *b"somebody without it has this one";
 /// Length of a MAVLink signature, bytes: link number, timestamp and tag.
 const SIGNATURE: usize = 13;
 
-/// Largest timestamp of a signature, 10 µs.
+/// Largest timestamp of a signature, in units of 10 µs since 2015-01-01.
 const LAST: u64 = (1 << 48) - 1;
 /// A minute in units of 10 µs.
 const MINUTE: u64 = 6_000_000;
 /// Number of senders that a link remembers.
 const SENDERS: usize = 8;
 
-/// Origin of the timestamps: 2015-01-01, µs since 1970.
+/// Time 2015-01-01, from which timestamps count, µs since 1970-01-01.
 const BEGIN_US: u64 = 1_420_070_400_000_000;
-/// Timestamp of 2026-11-22.
+/// Timestamp of 2026-11-22 in a signature, in units of 10 µs since 2015-01-01.
 const TODAY: u64 = 37_527_840_000_000;
 
 const HISTORY: usize = 32;
@@ -34,11 +34,11 @@ type Sender = ((u8, u8, u8), u64);
 
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// Timestamp of the simulated autopilot, 10 µs.
+    /// Timestamp of the simulated autopilot, in units of 10 µs since 2015-01-01.
     stamp: u64,
     /// Newest signed frames of the autopilot, for replays.
     history: Vec<Vec<u8>>,
-    /// Expected clock of the tested link at the time `at`, 10 µs.
+    /// Expected clock of the tested link at the time `at`, in units of 10 µs since 2015-01-01.
     time: u64,
     at: Instant,
     /// Senders that the tested link should remember.
@@ -52,7 +52,7 @@ pub(super) struct Peer {
 impl Peer {
     /// Creates the autopilot's end of a signed link, and the signing settings of the tested link.
     ///
-    /// `input` chooses if the tested link knows the time at its start.
+    /// `input` decides if the tested link knows the date at its start.
     pub(super) fn new(input: &mut Input<'_>, now: Instant) -> (Self, Signing) {
         let time = match input.below(4) {
             0 => 0,
@@ -78,12 +78,12 @@ impl Peer {
 
     /// Signs a frame of the autopilot, mostly correctly.
     ///
-    /// Otherwise it stays unsigned, has another key or an old timestamp, is damaged, or is replaced by an earlier
-    /// frame.
+    /// Otherwise the frame stays unsigned, has a wrong key or an old timestamp, is damaged, or is replaced by an
+    /// earlier frame.
     pub(super) fn sign_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();
         let (key, link) = match how {
-            // Ten links, but only eight senders are remembered.
+            // There are ten link numbers, but the tested link remembers only eight senders.
             160..192 => (KEY, how % 10),
             192..208 => (OTHER, 0),
             208..216 => return frame.to_vec(),
@@ -122,7 +122,7 @@ impl Peer {
         self.history.get(at).cloned()
     }
 
-    /// Sets the autopilot's clock to another time.
+    /// Sets the autopilot's clock to a different time.
     ///
     /// It is a day earlier or later, near the tested link's time, or the largest timestamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
@@ -153,7 +153,7 @@ impl Peer {
 
     fn accepts(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         match received.message {
-            // Unknown messages and those of a radio need no signature.
+            // Unknown messages and messages of a radio need no signature.
             None | Some(Incoming::RadioStatus { .. }) => return true,
             Some(_) => {}
         }
@@ -175,7 +175,7 @@ impl Peer {
         if frame != sealed(KEY, unsigned, *link, stamp) || !is_new {
             return false;
         }
-        // If several senders have the same timestamp, the one known longest is replaced.
+        // If several senders have the same timestamp, the one that was stored first is replaced.
         let oldest = || {
             let places = (0..).zip(&self.senders);
             let oldest = places.min_by_key(|(_, (_, last))| *last);
@@ -218,7 +218,7 @@ impl Peer {
             stamp >= self.time || stamp == LAST,
             "{stamp} is of the past"
         );
-        // When its clock stands still, its timestamp advances by at most one per frame.
+        // While the link's clock stands still, its timestamp advances by at most one per frame.
         assert!(
             stamp <= self.time.max(self.sent + 1),
             "{stamp} is of the future"

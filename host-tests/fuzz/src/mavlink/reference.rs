@@ -43,7 +43,7 @@ impl Reference {
             let checked = at + 10 + usize::from(length);
             let end = checked + 2 + if flags == 1 { 13 } else { 0 };
             let Some(frame) = bytes.get(at..end) else {
-                // This incomplete frame may become valid, so nothing after it is examined.
+                // This incomplete frame may still become valid, so the bytes after its start are not examined yet.
                 break;
             };
             all.checksums += 1;

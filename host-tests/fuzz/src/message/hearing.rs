@@ -51,7 +51,7 @@ impl Body<'_, '_> {
 
 /// Returns the sums of a sensing message, for random measurements at up to eight positions.
 ///
-/// `input` chooses if the powers are those of one interferer or arbitrary.
+/// `input` decides if the powers are those of one interferer, or arbitrary.
 fn of_places(input: &mut Input<'_>) -> [f32; SUMS] {
     let of_one = input.flag();
     let unit = input.scaled(1e-6, 1e12);

@@ -46,7 +46,8 @@ impl Body<'_, '_> {
 
     /// Appends the number of the hello that the offer answers.
     ///
-    /// Below 240 `choice` gives the relay's last hello, otherwise the fuzzer's input gives any number.
+    /// If `choice` is below 240, it is the number of the relay's last hello; otherwise the fuzzer's input gives any
+    /// number.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
             0..240 => self.state.offer_number,
@@ -57,8 +58,8 @@ impl Body<'_, '_> {
 
     /// Appends Tx and Rx positions, chosen by `choice`.
     ///
-    /// Mostly all numbers are 0, which means none. Otherwise the positions are 1000 m apart as in the paper, or
-    /// arbitrary.
+    /// In most cases all numbers are 0, which means no positions. Otherwise the positions are 1000 m apart as in the
+    /// paper, or arbitrary.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -70,7 +71,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends a mission version: the newest of the tested relay, one of the next three, or any.
+    /// Appends a mission version: the newest of the tested relay, one of the three after it, or any number.
     fn version(&mut self) {
         let held = self.state.held.version;
         let version = match self.input.byte() {
@@ -80,7 +81,7 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends the mission's number of relays, mostly that of the mission loaded before flight.
+    /// Appends the mission's number of relays, mostly the number in the mission loaded before flight.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.state.relays,
@@ -89,7 +90,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission with another interferer, an altitude range and a lateral range.
+    /// Appends the paper's mission with a changed interferer, an altitude range and a lateral range.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));
@@ -129,7 +130,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, 1e5));
     }
 
-    /// Appends the three path-loss factors `losses`. Rarely one of them is replaced by any number.
+    /// Appends the three path-loss factors `losses`. In rare cases one of them is replaced by any number.
     fn losses(&mut self, mut losses: [f64; 3]) {
         let which = usize::from(self.input.byte());
         if let Some(loss) = losses.get_mut(which) {

@@ -5,7 +5,7 @@ use uav_relay::wire::digest::MissionId;
 
 use crate::input::Input;
 
-/// State of the tested relay, as far as a neighbour can know it.
+/// State of the tested relay, as far as a neighbour can know this state.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
     /// Digest of the mission loaded before flight.
@@ -57,7 +57,7 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Appends the number of a pass, and the digest of mission and view, rarely of another view.
+    /// Appends the number of a pass, and the digest of mission and view. Rarely the view is a wrong one.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.state.view);
@@ -71,8 +71,8 @@ impl Body<'_, '_> {
 
     /// Appends the name of a view (membership of the chain).
     ///
-    /// It is the relay's accepted view, an earlier one or any one. Or it has one of the next numbers, with one of the
-    /// first four relays as proposer.
+    /// It is the relay's accepted view, an earlier one or any one. Or the view has one of the next numbers, with one of
+    /// the first four relays as proposer.
     pub(super) fn view(&mut self) {
         let own = self.state.view;
         let view = match self.input.byte() {
@@ -116,7 +116,8 @@ impl Body<'_, '_> {
 
     /// Appends the last part of a lease renewal: the flag `in_place`, and often two nodes.
     ///
-    /// In half of the messages the leaving and the joining node follow. At least one of them is not 0.
+    /// In half of the messages the numbers of the leaving and of the joining node follow. At least one of the two is
+    /// not 0.
     pub(super) fn renewal_nodes(&mut self) {
         self.small(0, 1);
         if self.small(0, 1) == 1 {
@@ -143,7 +144,7 @@ impl Body<'_, '_> {
         number
     }
 
-    /// Appends a byte, mostly from `least` to `most`; returns it.
+    /// Appends a byte, mostly from `least` to `most`, and returns this byte.
     pub(super) fn small(&mut self, least: u8, most: u8) -> u8 {
         let byte = self.input.byte();
         let small = if byte < 240 {
@@ -183,7 +184,8 @@ impl Body<'_, '_> {
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// Appends a list of up to `most` floats, with its count. All are equal, or each is from `low` to `high`.
+    /// Appends a list of up to `most` floats, with its count. All floats are equal, or each of them is from `low` to
+    /// `high`.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();
@@ -207,9 +209,9 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission: the newest stored, the loaded one, or another.
+    /// Returns version and digest of a mission: the newest stored, the initially loaded one, or a third.
     ///
-    /// The loaded mission was loaded before flight. Another one has a newer, older or arbitrary version.
+    /// A third mission has a newer, older or arbitrary version. The input bytes decide.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {
@@ -233,7 +235,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the session number of a fence (collision-guard message): the relay's, small, or any.
+    /// Appends the session number of a fence (collision-guard message): the relay's, a small one, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),

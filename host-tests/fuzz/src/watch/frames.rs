@@ -7,7 +7,7 @@ use uav_relay::{Port, Relay, Settings, Wiring};
 
 use super::number::number_of;
 
-/// Maximum difference of the sender's and receiver's node numbers on a shared channel.
+/// Maximum difference between the node numbers of sender and receiver on a shared channel.
 const NEAR: u16 = 4;
 
 /// Network number of every fuzzed relay.
@@ -65,7 +65,7 @@ impl Frames {
             let off = self.node.abs_diff(header.destination) <= far;
             let upstream = off && header.destination < self.node;
             let downstream = off && header.destination > self.node;
-            // A relay sends to a duplicate of its own index, but only unsigned.
+            // A relay also sends frames to a duplicate of its own index, but only unsigned ones.
             let own = header.destination == self.node && !signs;
             let right = own
                 || match (settings.wiring, port) {

@@ -33,7 +33,7 @@ const WRONG: [&str; 8] = [
 /// Exempt doc comments: path, colon and first sentence. The list stays empty.
 const EXEMPT: [&str; 0] = [];
 
-/// Old names of renamed items, one a line: words that nothing else uses.
+/// Old names of renamed items, one a line: words that no other name uses.
 const OLD_NAMES: &str = include_str!("../../data/old_names.txt");
 
 /// Files that may contain old names: their list, and the table of old and new names.

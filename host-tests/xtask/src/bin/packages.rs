@@ -27,7 +27,7 @@ const TESTS_ALONE: [&str; 2] = ["alterable_logger", "colored"];
 
 /// Returns true if a licence expression permits the use under [`ALLOWED`] licences.
 ///
-/// Each operand of `AND` must offer one of them. An older `/` counts as `OR`.
+/// Each operand of `AND` must offer a licence in [`ALLOWED`]. An older `/` counts as `OR`.
 fn is_allowed(expression: &str) -> bool {
     let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
     let one = |licence: &str| {
@@ -60,7 +60,7 @@ fn cargo(arguments: &[&str]) -> Result<String, String> {
 
 /// Returns the output of `cargo tree` for the locked packages, all targets and all features.
 ///
-/// `arguments` are more options.
+/// `arguments` are further options of `cargo tree`.
 fn tree(arguments: &[&str]) -> Result<String, String> {
     let common = [
         "tree",
@@ -87,7 +87,7 @@ fn licences() -> Result<Vec<String>, String> {
 
 /// Returns an error message for each package that the library needs in several versions.
 ///
-/// Packages in [`TWICE`] and packages for tests or the build only are not counted.
+/// Not counted are packages in [`TWICE`], and packages needed only for tests or the build.
 fn twice() -> Result<Vec<String>, String> {
     let text = tree(&[
         "--package=uav-relay",

@@ -49,8 +49,8 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the view decided on `proposal` after it has visited `nodes` in this order. `None` without a quorum.
-    /// Only the last `accept` of these nodes receive the decision.
+    /// Returns the view decided on `proposal` after it has visited `nodes` in this order. `None` without a quorum. Of
+    /// these nodes, only the last `accept` receive the decision.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -98,7 +98,7 @@ fn more_than_half_or_half_with_the_initial_leader_decide() {
             if most {
                 assert_eq!(outcome, Some(view(1, 1, there)));
             }
-            // Two parts of one chain never both decide.
+            // Two parts of a chain never both decide on a view.
             let rest = ((1 << relays) - 1) & !part;
             let rest: Vec<u16> = (1..=relays)
                 .filter(|node| rest >> (node - 1) & 1 == 1)
@@ -134,7 +134,7 @@ fn only_members_of_the_view_decide() {
 fn of_a_split_view_the_half_with_its_proposer_decides() {
     for (part, goes_on) in [(&[3, 4][..], true), (&[1, 2], false), (&[2, 3], true)] {
         let mut chain = Chain::of(4);
-        // Node 3 proposes, and the other nodes receive the decision in two ways.
+        // Node 3 proposes, and the other nodes receive the decision in one of two ways.
         let view = view(1, 3, 4);
         for (electorate, node) in chain.0.iter_mut().zip(1..) {
             electorate.vote(node, view.id, None, left(0)).unwrap();
@@ -304,8 +304,8 @@ fn votes_are_kept_until_their_result_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Checks that two views can be in force if a relay loses its stored votes. Node 3 is a member of the current view,
-/// loses its votes, and votes in the initial view.
+/// Shows that two views can be in force at the same time if a relay loses its stored votes. Node 3 is a member of the
+/// current view, loses its votes, and votes in the initial view.
 #[test]
 fn a_relay_without_its_record_may_decide_a_second_view() {
     let mut chain = Chain::of(5);

@@ -43,7 +43,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let (name, input) = open(options.file.as_deref())?;
     match source::read(input, |item| printer.take(item)) {
         Ok(()) => Ok(()),
-        // The reader has closed the pipe, as `head` does: no error.
+        // If the reader has closed the pipe, as `head` does, this is no error.
         Err(SourceError::Taken(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(SourceError::Taken(error)) => {
             let line = format!("standard output: cannot be written: {error}");
@@ -58,7 +58,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Returns the signing key at the end of the capture's comment, where a simulation writes it, if any.
+/// Returns the signing key at the end of the capture's comment, if any. A simulation writes it there.
 fn of_comment(comment: &str) -> Option<[u8; 32]> {
     let (_, digits) = comment.rsplit_once(", key ")?;
     key::parse(digits).ok()

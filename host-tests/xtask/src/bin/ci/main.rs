@@ -1,8 +1,8 @@
 //! Runs all checks: `cargo ci`. The last lines name the failed ones, with their output.
 //!
 //! The steps run in three sequences (lanes) at the same time. Steps with the same target folder are in the main lane.
-//! Steps with a folder of their own are in a second lane, at low priority. Tests that mostly wait for the wall clock
-//! are in a third.
+//! Steps with a target folder of their own are in a second lane, at low priority. Tests that mostly wait for the wall
+//! clock are in a third lane.
 
 mod prepare;
 mod steps;
@@ -91,7 +91,7 @@ fn run_in_one_piece(lane: Vec<(usize, &Step)>, all: usize) -> Vec<(&str, Evidenc
     let run = |(number, step)| {
         let mut output = Vec::new();
         let failure = run(number, all, step, &mut output);
-        // At once, so that these lines do not mix with those of other steps.
+        // The lines are written in one piece, so that they do not mix with those of other steps.
         _ = stdout().write_all(&output);
         failure
     };
@@ -124,7 +124,7 @@ fn run<'a>(
 /// Number of last output lines repeated at the end for a failed step without tests.
 const LAST_LINES: usize = 20;
 
-/// Maximum number of lines repeated from a list of failures: panics, or names of failed tests.
+/// Maximum number of lines repeated from a list of failures, either panics or names of failed tests.
 const LINES_OF_FAILURES: usize = 100;
 
 /// Relevant output of a failed step: the `failures:` of each test binary, or the last lines.
@@ -149,7 +149,7 @@ impl Evidence {
     }
 
     pub(crate) fn add(&mut self, line: &str) {
-        // This heading is before the panics, and again before the names.
+        // This heading comes before the panics, and a second time before the names.
         if line == "failures:" {
             self.remaining = Some(LINES_OF_FAILURES);
         }

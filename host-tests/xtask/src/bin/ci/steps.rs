@@ -54,13 +54,13 @@ pub(crate) struct Step {
 /// Sequence of steps. The lanes run at the same time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Lane {
-    /// Main lane, one step after the other.
+    /// Main lane: its steps run one after the other.
     Main,
-    /// Starts after the previous step of the main lane, which then goes on at once.
+    /// Lane of steps that mostly wait for the wall clock.
     ///
-    /// The step mostly waits for the wall clock.
+    /// Such a step starts after the previous step of the main lane. The main lane then continues at once.
     Waiting,
-    /// Low priority, after the previous `Background` step, with a target folder of its own.
+    /// Lane of steps at low priority, one after the other, each with a target folder of its own.
     Background,
 }
 
@@ -74,7 +74,7 @@ pub(crate) const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
 
 /// Number of inputs per fuzz target.
 ///
-/// The seed is fixed, so this finds regressions; only a long run finds new faults.
+/// The seed is fixed, so these inputs find regressions; only a long run finds new faults.
 const EXECUTIONS: u32 = 10_000;
 
 fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
@@ -86,7 +86,7 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
     }
 }
 
-/// Returns `steps` for the background lane: at the same time as others, at low priority.
+/// Returns `steps` for the background lane: at the same time as other lanes, at low priority.
 ///
 /// They use idle time: many tests wait for the wall clock.
 fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
@@ -100,7 +100,8 @@ fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
 impl Step {
     /// Runs the step's command, and copies its standard output to `out`.
     ///
-    /// The error output goes to `out` beside the main lane, otherwise to this program's error output.
+    /// In a lane other than the main lane, the error output goes to `out` as well; in the main lane, to this program's
+    /// error output.
     ///
     /// # Errors
     /// The relevant output, if the command fails.
@@ -333,8 +334,8 @@ fn embassy() -> Vec<Step> {
 
 /// Returns the step that tests the library and a simulated chain with the features in `set` only.
 ///
-/// `set` is a list with commas. The exhaustive model of views depends on no feature, and takes most of the time of
-/// the library's tests. So it runs without features and with all features only.
+/// `set` is a list with commas. The exhaustive model check of views depends on no feature, and takes most of the time
+/// of the library's tests. So it runs only without features and with all features.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
@@ -383,7 +384,7 @@ fn firmware() -> Vec<Step> {
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
     for target in FUZZ_TARGETS {
-        // Findings are not added to the corpus. libFuzzer fails without this folder.
+        // New inputs go to this folder, not to the corpus. libFuzzer fails if the folder is missing.
         let found = format!("target/fuzz/{target}");
         _ = std::fs::create_dir_all(&found);
         let fuzz = format!(

@@ -45,7 +45,7 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     ));
     rows.extend(table(&counted, SIGNED)?);
     rows.extend(table(&counted, UPLOADED)?);
-    // A separate image, because more code would change how the rest is compiled.
+    // These figures have an image of their own, because more code would change how the rest is compiled.
     let runners = count(&build("cost", &["--features", "async,internals"])?)?;
     rows.extend(table(&runners, RUNNERS)?);
     rows.extend(table(&runners, FLOWN)?);
@@ -156,7 +156,7 @@ const UPLOADED: &[Counted] = &[
     ("length of its frame", "bytes", &["offer_bytes"], Some(149)),
 ];
 
-/// Table row: description, unit, names of measured figures, and budget. It shows the largest figure.
+/// Table row: description, unit, names of measured figures, and budget. The row shows the largest of these figures.
 pub(crate) type Counted = (
     &'static str,
     &'static str,
@@ -438,7 +438,7 @@ const FLOWN: &[Counted] = &[
     ),
 ];
 
-/// Names of figures that are single calls of a relay's functions. The largest has a budget.
+/// Names of figures that are single calls of a relay's functions. The largest of these figures has a budget.
 const CALLS: &[&str] = &[
     "begin_sweep",
     "sweep",

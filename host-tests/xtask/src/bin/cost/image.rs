@@ -49,7 +49,7 @@ type Image = (
 
 /// Measured firmware images, with the maximum of flash, static RAM and stack.
 ///
-/// Relay and ground station share some code, which costs an image with `auth` 0.4 KB of flash, and saves 0.8 KB of
+/// The code that relay and ground station share costs an image with `auth` 0.4 KB of flash, and saves it 0.8 KB of
 /// stack.
 const IMAGES: &[Image] = &[
     (
@@ -206,8 +206,9 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 
 /// Returns the largest stacks of the main thread and of one interrupt, bytes.
 ///
-/// The thread begins with the function that `Reset` calls. The interrupt includes the frame saved by the processor
-/// with its FPU registers. `pair` is true for ports to two neighbours, `flies` for a port to an autopilot.
+/// The thread begins with the function that `Reset` calls. The interrupt's stack includes the registers that the
+/// processor saves, with those of the FPU. `pair` is true for ports to two neighbours, `flies` for a port to an
+/// autopilot.
 pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
@@ -238,7 +239,7 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     let (thread, path) = deepest("main")?;
     println!("deepest stack: {thread} bytes by {}", path.join(" > "));
     let mut handler = 0;
-    // A radio needs one port. Without the feature `flight` the autopilot's port is not used.
+    // A radio needs only one port. Without the feature `flight` the autopilot's port is not used.
     let others = [pair.then_some("USART3"), flies.then_some("USART1")];
     for name in ["USART2", "SysTick"]
         .into_iter()
@@ -274,7 +275,7 @@ pub(crate) fn no_panic() -> Result<(), String> {
     }
 }
 
-/// Checks that the asynchronous image can only panic when a completed future is polled.
+/// Checks that the asynchronous image can panic only if a completed future is polled.
 ///
 /// The compiler adds this panic to each `async fn`, so the image cannot link without a panic handler. An `await`
 /// never reaches it.
@@ -300,7 +301,7 @@ fn only_finished_futures_panic() -> Result<(), String> {
             finished += 1;
         }
     }
-    // None at all would mean a wrong search pattern.
+    // If there were no such panic at all, the search pattern would be wrong.
     if finished == 0 {
         return Err("the asynchronous image has no panic at all: link it with the others".into());
     }

@@ -119,7 +119,7 @@ pub(crate) const fn row(
 const HEAD: &str =
     "| | measured | at 168 MHz, an instruction a cycle | budget |\n| --- | --- | --- | --- |\n";
 
-/// Clock of the STM32F405, MHz: instructions per microsecond at one per cycle.
+/// Clock of the STM32F405, MHz: number of instructions per microsecond at one instruction per cycle.
 const CLOCK_MHZ: u64 = 168;
 
 /// Document with costs: its present text, and its text with the measured costs.
@@ -189,7 +189,7 @@ pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
 
 /// Returns true if the documented costs are for the installed compiler and emulator.
 ///
-/// The costs depend on both versions, so other ones are not compared.
+/// The costs depend on both versions, so costs of other versions are not compared.
 pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
     let results = std::fs::read_to_string(root.join("examples/RESULTS.md"));
     results.is_ok_and(|text| text.contains(&format!("(rustc {rustc}, QEMU {qemu}, ")))
@@ -212,7 +212,7 @@ fn with(
     })
 }
 
-/// Returns the README's table rows with costs: fixed beginning, and measured text.
+/// Returns the README's table rows that state costs. Each has a fixed beginning, and a text with the measured costs.
 fn lines(rows: &[Row]) -> Option<[(&'static str, String); 4]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;

@@ -85,8 +85,8 @@ fn main() -> ExitCode {
 
 /// Runs the commands of all pages whose name contains `only`; returns the number of faulty blocks.
 ///
-/// A block is faulty if a command fails or its output differs from the page. With `slow` only blocks marked as slow
-/// are run, otherwise only the others.
+/// A block is faulty if a command fails or its output differs from the page. If `slow` is true, only blocks marked as
+/// slow are run; otherwise only those not marked.
 fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
     let shell = page::Shell::build(root)?;
     let (mut faults, mut run, mut left_out, mut checked) = (0, 0, 0, 0);
@@ -169,7 +169,7 @@ pub(crate) fn own_commands(script: &str) -> Vec<String> {
 }
 
 fn own_command(line: &str) -> Option<String> {
-    // The last program of a pipe reads nothing.
+    // The last program of a pipe gets no input.
     let command = line.rsplit(" | ").next()?.trim().trim_end_matches('&');
     let (first, rest) = command.split_once(' ')?;
     if first == "cargo" {
@@ -199,7 +199,8 @@ fn with_alias(program: &str, options: &str) -> Option<String> {
     Some(format!("cargo {alias} {options}"))
 }
 
-/// Checks by its exit status that a program has accepted its options. `None` is a signal.
+/// Checks by its exit status that a program has accepted its options. A status of `None` means that a signal ended the
+/// program.
 ///
 /// # Errors
 /// The command, its status, and the last line of its output.

@@ -5,15 +5,15 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 
-/// Words that mark the commands of a block as not run.
+/// Words after the fence that mark the commands of a code block as not run.
 const WHY_NOT: [&str; 6] = ["hardware", "itself", "root", "slow", "tested", "window"];
 
 /// Kind of a code block on a page.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
-    /// Shell commands; with the word that marks them as not run, if any.
+    /// Block of shell commands, with the word that marks them as not run, if any.
     Commands(Option<String>),
-    /// Block `text`: the output of the preceding commands, or any other text.
+    /// Block `text`: output of the preceding commands, or any other text.
     Text,
     Other,
 }
@@ -64,7 +64,7 @@ impl Block {
     }
 }
 
-/// Returns a command and its expected exit status, from a comment `# exit status N`, if any.
+/// Returns a command and its expected exit status, if a comment `# exit status N` states one.
 fn status(line: &str) -> Option<(&str, u8)> {
     let (command, comment) = line.split_once(" # exit status ")?;
     let digits = comment.split(|sign: char| !sign.is_ascii_digit()).next()?;
@@ -132,14 +132,14 @@ const PACKAGES: [&str; 5] = [
     "uav-relay-replay",
 ];
 
-/// Time limit of one block, s. Slow blocks have another limit.
+/// Time limit of one code block's commands, s. Blocks marked as slow have a longer limit.
 const LIMIT_S: u32 = 60;
 const SLOW_S: u32 = 1_800;
 
-/// Time limit of a command without its hardware, s: enough to check the options.
+/// Time limit of a command that needs absent hardware, s: enough to check its options.
 const BEGUN_S: u32 = 2;
 
-/// Key files that the pages use; the user is expected to have made them.
+/// Key files that the pages use; the pages assume that the user has made them.
 const KEYS: [&str; 2] = ["network.key", "network7.key"];
 
 const NOT_CLONED: [&str; 2] = ["target", ".git"];
@@ -184,7 +184,7 @@ impl Shell {
     /// Fills the shell's folder like a new clone of the project, for the next page.
     pub(crate) fn clean(&self) -> Result<(), String> {
         let failed = |error: std::io::Error| format!("{}: {error}", self.folder.display());
-        // The folder may not exist.
+        // The folder possibly does not exist.
         let _ = std::fs::remove_dir_all(&self.folder);
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
         for entry in std::fs::read_dir(&self.root).map_err(failed)?.flatten() {
@@ -206,7 +206,7 @@ impl Shell {
 
     /// Runs a script until its first failing command; returns its output.
     ///
-    /// With `slow` the time limit is longer.
+    /// If `slow` is true, the time limit is longer.
     ///
     /// # Errors
     /// The exit status and the last lines of the output, if a command fails.
@@ -246,8 +246,8 @@ impl Shell {
 
 /// Returns the definition of a shell function `cargo` for the commands of a page.
 ///
-/// For an alias in `config` it runs the program already built in `bin`, otherwise the real cargo in the folder
-/// `root`. Elsewhere cargo would build everything again, because the paths differ.
+/// For an alias in `config` it runs the program already built in `bin`, otherwise the real cargo in the folder `root`.
+/// From a different folder, cargo would build everything again, because the paths differ.
 fn functions(config: &str, bin: &Path, root: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {
@@ -269,7 +269,7 @@ fn functions(config: &str, bin: &Path, root: &Path) -> String {
 
 /// Checks that the lines of the page occur in the output, in order, with other lines in between.
 ///
-/// With `noisy` each number matches any number.
+/// If `noisy` is true, each number matches any number.
 ///
 /// # Errors
 /// The first missing line, and the most similar line of the output.
