@@ -54,7 +54,8 @@ impl Flight {
 
     /// Runs the chain until all relays hold their agreed positions; returns true if they do.
     ///
-    /// It ends after `turns` rounds. Each round delivers the pending frames and handles the next timers.
+    /// The run ends after `turns` rounds in any case. Each round delivers the pending frames and handles the next
+    /// timers.
     fn run_until_holding(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {
@@ -86,8 +87,8 @@ impl Flight {
 
 /// Result of a simulated chain.
 ///
-/// `settled`: 1 if all relays hold their agreed positions. `most`: instructions of the most expensive call.
-/// `longest`: longest frame, bytes.
+/// `settled` is 1 if all relays hold their agreed positions. `most` is the number of instructions of the most expensive
+/// call, `longest` the length of the longest frame, bytes.
 struct Flown {
     settled: u32,
     most: u32,

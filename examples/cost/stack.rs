@@ -9,7 +9,7 @@ use super::missions::mission;
 
 /// Measures the maximum stack use of a relay's calls, bytes.
 ///
-/// The calls overwrite a pattern on the stack.
+/// The calls overwrite a pattern on the stack, of which the intact rest is measured.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);
@@ -70,7 +70,8 @@ pub(crate) fn unpainted_bytes() -> u32 {
     let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();
     let first = black_box(words.as_ptr().cast::<u32>());
     let untouched = (0..PAINTED)
-        // SAFETY: inside the array. Its content is arbitrary on purpose; a volatile read of it is allowed.
+        // SAFETY: the address is inside the array. The array's content is arbitrary on purpose, and a volatile read of
+        // it is allowed.
         .take_while(|at| unsafe { first.add(*at).read_volatile() } == PAINT)
         .count();
     u32::try_from(4 * (PAINTED - untouched)).unwrap_or(u32::MAX)

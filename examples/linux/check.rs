@@ -11,7 +11,7 @@ pub const fn colour(is_green: bool) -> &'static str {
     if is_green { "green" } else { "red" }
 }
 
-/// Returns the last line of a check: how many of `all` items are red. `items` is their plural noun.
+/// Returns the last line of a check: how many of `all` items are red. `items` is the plural noun for them.
 ///
 /// # Errors
 /// The line, if at least one item is red.
@@ -26,9 +26,9 @@ pub fn verdict(red: usize, all: usize, items: &str) -> Finding {
 /// Condition for the end of a check: all items green for `green_for`, or the time `limit`.
 #[derive(Debug)]
 pub struct End {
-    /// Time at which the check ends in any case.
+    /// Time at which the check ends even if an item is red.
     pub limit: Instant,
-    /// Time for which all items have to be green.
+    /// Minimum time for which all items must be green.
     pub green_for: Duration,
     /// Time since which all items have been green; `None` if an item is red.
     pub green_since: Option<Instant>,

@@ -63,7 +63,7 @@ pub trait Parse<T>: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'stati
 
 impl<T, F: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static> Parse<T> for F {}
 
-/// Returns the parser of a whole number in the range `least` to `most`. Its error names the range.
+/// Returns the parser of a whole number in the range `least` to `most`. The parser's error text names the range.
 pub fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Parse<T> {
     move |text: &str| {
         let value: Option<u64> = text.trim().parse().ok();
@@ -74,7 +74,7 @@ pub fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Parse<T> {
     }
 }
 
-/// Returns the parser of a number in a range. Its error names the range.
+/// Returns the parser of a number in a range. The parser's error text names the range.
 pub fn number([least, most]: [f32; 2]) -> impl Parse<f32> {
     move |text: &str| {
         let value = text.trim().parse().ok();

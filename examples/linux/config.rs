@@ -26,7 +26,7 @@ pub struct FileOnlySettings {
     pub field: Option<Interference>,
     /// Profiles (altitude and power) of single relays, with the relay's index.
     pub profiles: Vec<(u16, Profile)>,
-    /// Indices of the relays with a fixed altitude. The method chooses the others.
+    /// Indices of the relays with a fixed altitude. The method chooses the altitudes of all other relays.
     pub held: Vec<u16>,
     /// Positions of the relays in the file's plan; empty without a plan.
     pub places: Vec<Placement>,
@@ -112,7 +112,7 @@ impl FileOptions {
         self.options.extend(value.map(|value| (name, Some(value))));
     }
 
-    /// Adds an option whose value is a path relative to the file's folder, if the file has one.
+    /// Adds an option whose value is a path relative to the file's folder, if the file has this option.
     pub fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
         let path = path.map(|path| self.folder.join(path).into_os_string());
         self.options.extend(path.map(|path| (name, Some(path))));
@@ -187,7 +187,7 @@ impl FileOptions {
     }
 }
 
-/// Returns the value of the option `name` on the command line, if it is there.
+/// Returns the value of the option `name` on the command line, if the option is given.
 ///
 /// The value is empty if the option is the last word.
 fn value_of(line: &[OsString], name: &str) -> Option<String> {
@@ -202,7 +202,7 @@ fn value_of(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Returns true if two values are the same text or the same numbers. An empty `other` is always the same.
+/// Returns true if two values are the same text or the same numbers. An empty `other` counts as the same.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
@@ -339,7 +339,8 @@ fn mission_options(
     scenario: &Scenario,
     given: &mut FileOptions,
 ) -> Result<FileOnlySettings, String> {
-    // The mission is built for one relay, because the number of relays is in another section or on the command line.
+    // The mission is built for one relay, because the number of relays is in a different section or on the command
+    // line.
     let (mission, profiles) =
         mission::mission(scenario, 1, COMPANION_TOLERANCE).map_err(|error| error.to_string())?;
     let config = mission.config();
@@ -416,7 +417,7 @@ fn place(planned: &PlannedPlace) -> Placement {
     }
 }
 
-/// Returns the scenario with a minimum separation of 0 m: then any number of relays fits.
+/// Returns the scenario with a minimum separation of 0 m: so that any number of relays fits.
 fn without_separation(scenario: &Scenario) -> Scenario {
     Scenario {
         min_separation_m: 0.0,

@@ -37,15 +37,15 @@ pub fn counted(stats: &Stats) -> Value {
 /// Interval between two checks of the frame counters.
 const EVERY: Duration = Duration::from_millis(2_000);
 
-/// Number of frames rejected for one reason between two checks, from which on it is reported.
+/// Minimum number of frames rejected for one reason between two checks for a report of this reason.
 const MANY: u32 = 3;
 
 /// Number of damaged frames between two checks for which the log suggests a wrong baud rate.
 ///
-/// It suggests this only if no intact frame was received meanwhile.
+/// The log suggests this only if no intact frame was received between the two checks.
 const DAMAGED: u32 = 10;
 
-/// Detector of reasons why frames are rejected. It compares the counters with those at the last check.
+/// Detector of reasons why frames are rejected. The detector compares the counters with those at the last check.
 #[derive(Debug, Default)]
 pub struct RejectionReasons {
     last: Stats,

@@ -14,7 +14,7 @@ use crate::log::Log;
 use crate::tap::Tap;
 use crate::tty::Tty;
 
-/// Pause before the first attempt to reopen a tty. It doubles with every attempt, up to [`LONGEST`].
+/// Pause before the first attempt to reopen a tty. The pause doubles with every attempt, up to [`LONGEST`].
 const FIRST: Duration = Duration::from_millis(250);
 const LONGEST: Duration = Duration::from_millis(4_000);
 
@@ -43,7 +43,7 @@ struct Counts {
 }
 
 impl Replug {
-    /// Opens the tty. It must exist at the start, because a wrong name is a mistake.
+    /// Opens the tty. The tty must exist at the start, because a wrong name is a mistake.
     ///
     /// # Errors
     /// One line that names the option and the fault.
@@ -72,7 +72,7 @@ impl Replug {
         }
     }
 
-    /// Closes a failed tty, and reopens it when it is time. Logs each loss and each return once.
+    /// Closes a failed tty, and reopens it when an attempt is due. Logs each loss and each return once.
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
@@ -112,12 +112,12 @@ impl Replug {
         json!({ "option": self.option, "port": self.path.display().to_string() })
     }
 
-    /// Returns the time of the next attempt to reopen the tty; `None` while it is open.
+    /// Returns the time of the next attempt to reopen the tty; `None` while the tty is open.
     pub fn wake(&self) -> Option<Instant> {
         self.tty.is_none().then_some(self.again_at)
     }
 
-    /// Returns the tty's file descriptor and the events to poll; `None` while it is closed.
+    /// Returns the tty's file descriptor and the events to poll; `None` while the tty is closed.
     pub fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
         self.tty.as_ref().map(|tty| (tty.as_fd(), tty.interest()))
     }

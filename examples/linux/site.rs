@@ -19,7 +19,7 @@ pub struct SiteOptions {
 }
 
 impl SiteOptions {
-    /// Returns the positions of transmitter and receiver; `None` if they were not given.
+    /// Returns the positions of transmitter and receiver; `None` if the options were not given.
     pub fn sites(&self) -> Option<Sites> {
         let (Some(tx), Some(rx)) = (self.site_tx, self.site_rx) else {
             return None;

@@ -22,7 +22,7 @@ const QUEUE: usize = 1_024;
 
 const MAX_CAPTURES: u32 = 9_999;
 
-/// Bytes received or sent by one call, at the port number `port`.
+/// Bytes received or sent by one call at the port with number `port`.
 struct Piece {
     port: usize,
     at: Duration,
@@ -40,7 +40,7 @@ struct CaptureState {
     is_reported: AtomicBool,
 }
 
-/// Capture of one port. It passes the traffic to the writer thread.
+/// Capture of one port. The capture passes the traffic to the writer thread.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
@@ -111,7 +111,7 @@ impl Tap {
 
 /// Captures all further traffic of `ttys` in the file `asked`.
 ///
-/// Logs the file's name if another one had to be used.
+/// Logs the file's name if it differs from `asked`.
 ///
 /// An earlier capture is never overwritten, because it may be the only record of a crash. If `asked` exists, a number
 /// is added to the name.

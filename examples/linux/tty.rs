@@ -58,7 +58,7 @@ impl Tty {
 
     /// Marks the tty as failed if poll(2) reported a hang-up or an error.
     ///
-    /// For an unplugged adapter poll(2) returns at once at every call, so without the mark the program would never
+    /// For an unplugged adapter poll(2) returns at once at every call, so without this mark the program would never
     /// sleep.
     pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
@@ -144,7 +144,7 @@ fn configured(path: &Path, baud: u32) -> Result<OwnedFd, Errno> {
     line.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;
     line.set_speed(baud)?;
     tcsetattr(&fd, OptionalActions::Now, &line)?;
-    // Discards bytes from before the start, perhaps sent at another baud rate.
+    // Discards bytes from before the start, perhaps sent at a different baud rate.
     tcflush(&fd, QueueSelector::IFlush)?;
     Ok(fd)
 }

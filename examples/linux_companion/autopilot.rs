@@ -112,7 +112,7 @@ pub(crate) struct Companion {
 }
 
 impl Companion {
-    /// Opens the autopilot's port. It must exist at the start, because a wrong name is a mistake.
+    /// Opens the autopilot's port. The port must exist at the start, because a wrong name is a mistake.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
         let port = port(&plan.port)?;
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
@@ -183,7 +183,7 @@ impl Companion {
         })
     }
 
-    /// Returns the drone's position in the mission's coordinates; `None` if it is older than 3 s.
+    /// Returns the drone's position in the mission's coordinates; `None` if the position is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         self.off_line.place(now)
     }

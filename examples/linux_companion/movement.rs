@@ -128,7 +128,7 @@ impl Movement {
 
     /// Returns the drone's arrival at `goal`, if it must be logged.
     ///
-    /// `goal` is the agreed position if the setpoint has reached it, otherwise `None`.
+    /// `goal` is the agreed position once the setpoint has reached it; before that it is `None`.
     fn arrival(
         &mut self,
         now: Instant,
@@ -229,7 +229,7 @@ mod tests {
         }
     }
 
-    /// Checks that a drone which flies past its goal and back is logged as arrived once.
+    /// Checks that a drone that flies past its goal and back is logged as arrived only once.
     ///
     /// A stay near the goal of less than 2 s does not count as arrival.
     #[test]

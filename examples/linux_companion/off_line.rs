@@ -123,7 +123,7 @@ impl OffLineMonitor {
     }
 }
 
-/// Line from Tx to Rx, and the line with swapped latitude and longitude, `None` if invalid.
+/// Line from Tx to Rx, and the line with swapped latitude and longitude; the latter is `None` if invalid.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,
@@ -175,7 +175,7 @@ impl Lines {
     }
 }
 
-/// Returns the distance of `value` from the range `least` to `most`; 0 inside.
+/// Returns the distance of `value` from the range `least` to `most`; 0 if `value` is inside the range.
 fn beyond(value: f64, least: f64, most: f64) -> f64 {
     (least - value).max(value - most).max(0.0)
 }

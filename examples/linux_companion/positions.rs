@@ -75,7 +75,7 @@ impl Positions {
         (newest, endurance_s)
     }
 
-    /// Returns the drone's newest position; `None` if it is older than 3 s.
+    /// Returns the drone's newest position; `None` if the position is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
         fresh.map(|(_, place)| place)

@@ -16,7 +16,7 @@ use crate::relay::Refusal;
 const VIEWS: &str = "--view-file";
 const UPLOADS: &str = "--upload-file";
 
-/// Restores the votes of an earlier start into `relay`. Returns their file, and true if it had votes.
+/// Restores the votes of an earlier start into `relay`. Returns the file of the votes, and true if the file had votes.
 ///
 /// # Errors
 /// One line with the file, the fault and the remedy: a relay that has lost its votes must not vote again in the same
@@ -49,7 +49,7 @@ pub(crate) fn resume_views(
 
 /// Restores an uploaded mission of an earlier start into `relay`; returns true if there was one.
 ///
-/// `mission` is that of the relay's options, on which the upload is based.
+/// `mission` is the mission of the relay's options, on which the upload is based.
 ///
 /// An unusable file is logged and ignored.
 pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, log: &Log) -> bool {

@@ -31,7 +31,7 @@ impl fmt::Display for Exact {
 pub(crate) struct Report {
     log: Log,
     identity: Identity,
-    /// Number of relays in the mission at the start. Relays keep their numbers when others are lost.
+    /// Number of relays in the mission at the start. Relays keep their numbers when some relays are lost.
     relays: u16,
     digest: u16,
     fence: Option<Geofence>,

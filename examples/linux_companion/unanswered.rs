@@ -4,7 +4,7 @@
 
 use uav_relay::{Duration, Instant};
 
-/// Time without a HEARTBEAT after which an autopilot is reported as missing. It sends one every second.
+/// Time without a HEARTBEAT after which an autopilot is reported as missing. An autopilot sends one every second.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(3_000);
 
 /// Kind of data received from the autopilot's port since the start, from no data to valid data.

@@ -21,7 +21,7 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// Placeholder for the autopilot link, which this image lacks. It has no values.
+/// Placeholder for the autopilot link, which this image lacks. This type has no values.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {

@@ -335,7 +335,7 @@ impl Frames {
 /// Time and timers of an executor, for example `embassy-time`, `rtic-monotonics` or a virtual clock. A delay alone
 /// (`embedded-hal-async`'s `DelayNs`) is not enough, because the relay needs the current time.
 pub trait Clock {
-    /// Returns the present time since an arbitrary start. It never decreases.
+    /// Returns the present time since an arbitrary start. The result never decreases from call to call.
     fn now(&self) -> Instant;
 
     /// Completes at time `at`, or at once if `at` is in the past. If a different event comes first, the future is

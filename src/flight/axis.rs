@@ -43,12 +43,12 @@ pub enum AxisError {
     Tx(Geodetic),
     /// The latitude or longitude of the receiver is not on earth.
     Rx(Geodetic),
-    /// The transmitter and the receiver are less than 10 m apart.
+    /// The distance between transmitter and receiver is less than 10 m.
     TooShort {
         /// Straight distance between transmitter and receiver, m.
         distance_m: f64,
     },
-    /// The transmitter and the receiver are more than 100 km apart.
+    /// The distance between transmitter and receiver is more than 100 km.
     TooLong {
         /// Straight distance between transmitter and receiver, m.
         distance_m: f64,
@@ -81,7 +81,7 @@ impl core::fmt::Display for AxisError {
 
 impl core::error::Error for AxisError {}
 
-/// Line on earth from Tx to Rx. It converts between geodetic positions and the mission's coordinates.
+/// Line on earth from Tx to Rx. This type converts between geodetic positions and the mission's coordinates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
@@ -104,8 +104,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. It applies in all directions:
-    /// sideways, upward, before Tx and beyond Rx.
+    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. This maximum applies in all
+    /// directions: sideways, upward, before Tx and beyond Rx.
     pub const AROUND_M: f32 = 5_000.0;
 
     /// Creates the line from a transmitter at `tx` to a receiver at `rx`, both on the ground.
@@ -190,7 +190,7 @@ impl Axis {
 
     /// Converts a geodetic position to mission coordinates.
     ///
-    /// `None` if it is invalid, or farther than [`AROUND_M`](Self::AROUND_M) from the line. Constant work.
+    /// `None` if the position is invalid, or farther than [`AROUND_M`](Self::AROUND_M) from the line. Constant work.
     pub fn place(&self, point: Geodetic) -> Option<Placement> {
         if !point.is_valid() {
             return None;
@@ -251,7 +251,8 @@ impl Axis {
 
     /// Converts mission coordinates to a geodetic position.
     ///
-    /// `None` if they are not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line. Constant work.
+    /// `None` if the coordinates are not finite, or farther than [`AROUND_M`](Self::AROUND_M) from the line. Constant
+    /// work.
     pub fn point(&self, place: Placement) -> Option<Geodetic> {
         if !self.is_around(place) {
             return None;

@@ -101,7 +101,7 @@ pub struct Ground {
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
-    /// Clock of the station's timers. It never runs backwards.
+    /// Clock of the station's timers. This clock never runs backwards.
     clock: MonotonicClock,
     reports: PendingReports,
     watching: Watching,
@@ -232,7 +232,7 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of intact frames that were rejected. The sender is not in reach or has loaded another
+    /// Returns the number of intact frames that were rejected. The sender is not in reach or has loaded a different
     /// mission, or the frame is forged, replayed or malformed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
@@ -253,8 +253,7 @@ impl Ground {
     /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay has proven
     /// that it has the key.
     ///
-    /// After a restart of the relay or a new handshake, the value is false until the relay answers. Work: four relays
-    /// at most.
+    /// After a new handshake, the value is false until the relay answers. Work: four relays at most.
     pub fn relays_in_reach(&self) -> impl Iterator<Item = (u16, bool)> {
         let nodes = (1..=self.reach).map(|distance| self.at(distance));
         nodes.map(|node| (node, self.endpoint.knows(node)))
@@ -370,7 +369,7 @@ impl Ground {
         self.flown = Some(flown);
     }
 
-    /// Handles a hello of relay `by`, `distance` relays away. It reports the relay's newest mission.
+    /// Handles a hello of relay `by`, `distance` relays away. The hello reports the relay's newest mission.
     fn on_hello(&mut self, by: u16, distance: u16, hello: Hello) {
         if self.is_querying() {
             return self.on_query_reply(by, distance, hello);
@@ -424,7 +423,7 @@ impl Ground {
         } else {
             Progress::Stored { by }
         };
-        // A final state does not change, even if another relay is not up to date.
+        // A final state does not change, even if some relay is not up to date.
         if self.is_under_way() || !is_under_way(progress) {
             self.progress = progress;
         }
@@ -650,7 +649,8 @@ impl Watching {
         self.heard |= bit(distance);
     }
 
-    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The farthest is first.
+    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The first request goes to
+    /// the farthest relay.
     ///
     /// Returns true if that relay has sent no message since the last request to it.
     fn request(&mut self, now: Instant, reach: u16, node: u64) -> bool {
@@ -772,14 +772,14 @@ pub enum Progress {
         by: u16,
     },
     /// Complete: all relays of a view (list of the chain's members) fly the mission. Relays outside this view take no
-    /// part until they fly the mission, too.
+    /// part in the chain before they fly the mission.
     Flown {
         /// Node number of the relay that reports that all relays of its view fly the mission.
         by: u16,
         /// Latest view known to the reporting relay.
         view: ViewId,
-        /// Number of relays that fly the mission. These are the relay `by`, and the relays of its view farther from the
-        /// station.
+        /// Number of relays that fly the mission. Counted are the relay `by`, and the relays of its view that are
+        /// farther from the station.
         relays: u16,
     },
     /// A relay refuses the mission, so the chain does not fly it. The mission contradicts the Tx and Rx positions, or
@@ -805,7 +805,7 @@ const REPORTS_PER_HANDSHAKE: u8 = 16;
 pub(super) struct PendingReports {
     /// Last measured interference power, W; 0 before the first measurement.
     power_w: f32,
-    /// Bit mask of the relays to which the power must be reported. Bit d - 1 is the relay at distance d.
+    /// Bit mask of the relays to which the power must be reported. Bit d - 1 stands for the relay at distance d.
     pending: u8,
     measurements: u8,
 }

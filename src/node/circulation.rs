@@ -47,7 +47,7 @@ const LOG_MOST: u32 = 2;
 /// arrives earlier.
 const SOON: u32 = 4;
 
-/// Number of messages for which the channel still counts as lossy after a loss.
+/// Number of messages after a loss during which the channel still counts as lossy.
 const MEMORY: u8 = 8;
 
 /// State of one relay for a message that travels along the chain and back.
@@ -147,8 +147,8 @@ impl Circulation {
         matches!(self.stage, Stage::Outstanding)
     }
 
-    /// Returns the time at which this relay received or created the message. `None` without a message, and after it was
-    /// cancelled.
+    /// Returns the time at which this relay received or created the message. `None` without a message, and for a
+    /// cancelled one.
     pub(crate) const fn started_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Outstanding | Stage::Completed => Some(self.started_at),
@@ -156,8 +156,8 @@ impl Circulation {
         }
     }
 
-    /// Returns the time at which this relay learned the result. `None` while the result is unknown, and after the
-    /// message was cancelled.
+    /// Returns the time at which this relay learned the result. `None` while the result is unknown, and for a cancelled
+    /// message.
     pub(crate) const fn completed_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Completed => Some(self.completed_at),

@@ -12,9 +12,9 @@ use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// Mission that this relay flies now. It has as many relays as the current view has members.
+    /// Mission that this relay flies now. The mission has as many relays as the current view has members.
     pub(crate) mission: Mission,
-    /// Interference as configured in the active mission, before any estimate from measurements.
+    /// Interference as configured in the active mission, not as estimated from measurements.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
     /// Node number of this relay: 1 is the relay next to Tx.
@@ -69,7 +69,8 @@ impl Member {
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// Identifier of the newest mission that this relay has stored. It can be newer than the active mission.
+    /// Identifier of the newest mission that this relay has stored. The stored mission can be newer than the active
+    /// one.
     pub(crate) latest: MissionId,
     /// True if this relay is the last one: it has no neighbour on the side away from the leader.
     pub(crate) end: bool,

@@ -74,8 +74,8 @@ const DEFENCES: u8 = 32;
 /// With signed frames: number of claims that this relay sends after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
 
-/// Returns the minimum interval between claims of this relay. It keeps the claims of two relays and their echoes from
-/// filling the channel.
+/// Returns the minimum interval between claims of this relay. Without this limit, the claims of two relays and their
+/// echoes could fill the channel.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
@@ -96,7 +96,7 @@ pub(crate) struct IndexClaims {
     /// Last claim number received from another node with this relay's node number; 0 if there is none.
     last_rival: u32,
     /// Time of the last frame from another node with this relay's number. The flag is true if this relay already had a
-    /// position when the first such frame arrived. `None` without such a frame.
+    /// position when the first such frame arrived. `None` before the first such frame.
     contest: Option<(Instant, bool)>,
     /// Last times at which two nodes with the same number were detected; `None` if never. Entry 0 is for this relay's
     /// number, entry 1 for a neighbour's.
@@ -112,7 +112,7 @@ pub(crate) struct IndexClaims {
     /// Number of claims still to be sent to defend this relay's node number. The interval between them is
     /// [`least_interval`].
     defences: u8,
-    /// Earliest time at which another claim may be scheduled. This limits the rate of Claim messages.
+    /// Earliest time at which the next claim may be scheduled. This limits the rate of Claim messages.
     quiet_until: Instant,
     claim_due: bool,
     /// True if all authentication sessions must be restarted, because the claim number has changed.
@@ -155,8 +155,8 @@ impl IndexClaims {
         self.number
     }
 
-    /// Records that two nodes use the same number. Returns true if this must be reported: it was not observed in the
-    /// last 2 * `dead_after`.
+    /// Records that two nodes use the same number. Returns true if a report is due: two such nodes were not observed in
+    /// the last 2 * `dead_after`.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -199,8 +199,8 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease now and had one
-    /// at the first such frame.
+    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease now, and had
+    /// one when the first such frame arrived.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -485,7 +485,7 @@ mod tests {
     }
 
     /// Checks that a relay raises its claim number only if it had a position before its duplicate appeared. After 40 s
-    /// of silence the next frame counts as the first one.
+    /// of silence, the duplicate's next frame counts as its first one.
     #[test]
     fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();
@@ -580,8 +580,8 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// Checks that a relay repeats its claim for 4 s after a claim of an active duplicate. It stops early once the
-    /// duplicate is passive.
+    /// Checks that a relay repeats its claim for 4 s after a claim of an active duplicate. The relay stops early once
+    /// the duplicate is passive.
     #[test]
     fn an_index_is_defended_for_4_s_or_until_the_other_is_passive() {
         let settings = Settings::default();
@@ -615,7 +615,7 @@ mod tests {
         assert!(duplicate.handle_frame(at(0), Sender::Rival(larger), false, &settings));
         assert!(!duplicate.handle_frame(at(20), Sender::Unknown, false, &settings));
         assert!(!duplicate.handle_frame(at(40), Sender::Rival(larger), false, &settings));
-        // The claim of a passive node does not keep another node passive.
+        // A claim of a passive node does not keep a second node passive.
         let passive = Rival {
             passive: true,
             ..larger

@@ -86,7 +86,7 @@ pub(crate) struct Lease {
     is_agreed: bool,
     /// Time at which the leader starts the next lease renewal; `None` if none is due.
     next_at: Option<Instant>,
-    /// Maximum round trip of recent lease renewals. It decays slowly.
+    /// Maximum round trip of recent lease renewals. The stored value decays slowly.
     round_trip: Duration,
     circulation: Circulation,
     /// Orders of the leader in the last renewal of this view.
@@ -331,7 +331,7 @@ impl Lease {
                 _ => return Effects::STALE,
             }
         } else if !self.is_agreed {
-            // The agreement was made by another node with this relay's index.
+            // The agreement was made by a second node with this relay's index.
             return Effects::FOREIGN;
         }
         self.orders = pulse.orders;
@@ -339,8 +339,8 @@ impl Lease {
         effects
     }
 
-    /// Extends this relay's lease after the renewal `pulse`. The lease ends when the duration in `pulse` has passed
-    /// since this relay forwarded the renewal. All members took part in the renewal.
+    /// Extends this relay's lease after the renewal `pulse`. All members took part in this renewal. The lease ends when
+    /// the duration in `pulse` has passed since this relay forwarded it.
     ///
     /// The first lease in a view is not granted if `next` is more than twice the duration in `pulse`. It would expire
     /// before the next renewal, with the duration `next`, completes.

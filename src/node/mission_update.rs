@@ -58,7 +58,7 @@ struct Offering {
     heard: Option<Instant>,
     /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
-    /// Time at which the offer is sent again; `None` if it is not.
+    /// Time of the next repetition of the offer; `None` if none is scheduled.
     at: Option<Instant>,
     /// Number of offers sent since the mission or the neighbour last changed.
     tries: u8,
@@ -89,13 +89,13 @@ pub(crate) enum Offered {
     ///
     /// `is_new` is true at the first rejection of this mission.
     Refused { why: LineError, is_new: bool },
-    /// The mission is ignored: it is not newer than the stored one, or is meant for another chain.
+    /// The mission is ignored: it is not newer than the stored one, or is for a different chain.
     Passed,
 }
 
 /// Wait before a mission offer is first repeated, in hop times.
 const OFFER_HOPS: u32 = 4;
-/// Number of mission offers after which the interval between them doubles.
+/// Number of mission offers after which their interval doubles with each further offer.
 const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;
@@ -120,7 +120,7 @@ struct Uploads {
     loaded_m: f32,
     /// Range of altitudes in the mission loaded before flight, m. The relays' common altitude is within the range.
     loaded_band: Band,
-    /// Last mission that this relay or another relay has refused; `None` if there is none.
+    /// Last mission that this relay or any other relay has refused; `None` if there is none.
     refused: Option<MissionId>,
     /// Current and previous nonce (random number) in this relay's hellos. A mission offer must repeat one of them.
     asked: [Asked; 2],
@@ -442,8 +442,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Uses the stored mission's Tx and Rx positions from now on. Returns true if they differ from those used before.
-    /// Then all relay positions are invalid.
+    /// Uses the stored mission's Tx and Rx positions from now on. Returns true if these positions differ from those
+    /// used before. Then all relay positions are invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();

@@ -42,7 +42,7 @@ pub enum Sample {
         /// Position of the drone at the measurement. Each coordinate differs from that of Tx by at most 100 times the
         /// distance from Tx to Rx.
         at: Placement,
-        /// Received power, W. It must exceed the receiver's noise by 1e-30 to 1e6 W (`MEASURED_W`).
+        /// Received power, W. The power must exceed the receiver's noise by 1e-30 to 1e6 W (`MEASURED_W`).
         power_w: f32,
     },
     /// Mean interference power measured at Tx, on the ground. The firmware passes it to one of the first four relays,
@@ -51,9 +51,9 @@ pub enum Sample {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Mean interference power measured at Rx, on the ground. The firmware passes it to the last relay of the view. It
-    /// can also pass it to each of the three relays before the last one. Such a relay uses the value once it is the
-    /// last relay itself.
+    /// Mean interference power measured at Rx, on the ground. The firmware passes it to the last relay of the view. The
+    /// firmware can also pass it to each of the three relays before the last one. Such a relay uses the value only once
+    /// it is the last relay itself.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
@@ -95,8 +95,8 @@ impl Meter {
         }
     }
 
-    /// Adds a sample. Returns true if it was accepted. `at` is the setpoint of relay 1, from which the SIR of the first
-    /// hop gives the interference; `None` at other relays.
+    /// Adds a sample. Returns true if the sample was accepted. `at` is the setpoint of relay 1, from which the SIR of
+    /// the first hop gives the interference; `None` at other relays.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,
@@ -165,9 +165,10 @@ pub(super) struct SensorState {
     pub(super) left_out: u16,
     /// Node whose sensor counts as faulty, as found by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
-    /// State of the leader's search for a faulty sensor. It leaves out one relay's measurements after the other's.
+    /// State of the leader's search for a faulty sensor. The search leaves out the measurements of one relay after the
+    /// other.
     pub(super) trial: Trial,
-    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Only the leader knows them.
     pub(super) ends: EndsOff,
     /// True if the last collected measurements contradict each other and no faulty sensor was found.
     pub(super) contradicted: bool,
@@ -177,7 +178,7 @@ pub(super) struct SensorState {
     pub(super) silent: u8,
     /// Position of the last measurement at or below the receiver's noise.
     pub(super) silent_at: Placement,
-    /// True once the view's relays have received the current estimate. Known at the leader only.
+    /// True once the view's relays have received the current estimate. Only the leader knows this.
     pub(super) is_distributed: bool,
     /// Number and expected error of the measurements from which the current estimate was computed.
     pub(super) known: Knowledge,
@@ -246,7 +247,7 @@ impl Sensing {
         }
     }
 
-    /// Resets the sensing for a new mission. Its configured interference becomes the estimate.
+    /// Resets the sensing for a new mission. The mission's configured interference becomes the estimate.
     pub(super) const fn load(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
             sensor.estimate.estimate = InterferenceEstimate::Mission;
@@ -277,8 +278,8 @@ impl Sensing {
         }
     }
 
-    /// Returns the reason why the last measurements gave no estimate. `None` if they gave one, and at all relays but
-    /// the leader.
+    /// Returns the reason why the last measurements gave no estimate. `None` if they gave an estimate, and at all
+    /// relays except the leader.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
         match self.sensor() {
             Some(sensor) => sensor.unfit,
@@ -404,7 +405,7 @@ impl Findings {
 
 /// Adds a ground station's measured power to its `average`. Returns false if the power is not above the noise.
 ///
-/// `heard_w` is the measured power minus the receiver noise, W; `None` if it is not above the noise.
+/// `heard_w` is the measured power minus the receiver noise, W; `None` if the difference is not positive.
 fn take_level(
     average: &mut Average,
     now: Instant,

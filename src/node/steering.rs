@@ -47,7 +47,7 @@ struct Way {
     /// Agreed position at the last call of `advance`. `wanted`, the position to fly to now, approaches it in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
-    /// Motion to the agreed position; `None` once it has ended.
+    /// Motion to the agreed position; `None` once the motion has ended.
     motion: Option<Motion>,
 }
 
@@ -224,7 +224,8 @@ impl Steering {
         }
     }
 
-    /// Records at `now` if the drone follows the setpoints (`flown`). Returns true if this changes the guard's state.
+    /// Records that from `now` on the drone follows the setpoints, or does not (`flown`). Returns true if this changes
+    /// the guard's state.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -233,8 +234,8 @@ impl Steering {
         is_news
     }
 
-    /// Restarts the guard with another x axis, because the positions of Tx and Rx have changed. `now` is `None` after
-    /// a start of the relay.
+    /// Restarts the guard with a new x axis, because the positions of Tx and Rx have changed. `now` is `None` after a
+    /// start of the relay.
     pub(crate) fn switch_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
             guard.leave_line(now);
@@ -269,7 +270,7 @@ impl Steering {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 
-    /// Returns the neighbour's agreed position at `side`. `None` while it is unknown, and without a guard.
+    /// Returns the neighbour's agreed position at `side`. `None` while this position is unknown, and without a guard.
     pub(crate) fn neighbour_place(&self, side: Side) -> Option<Placement> {
         self.guard.as_ref().filter(|_| GUARD)?.neighbour_place(side)
     }

@@ -292,7 +292,8 @@ impl Relay {
         })
     }
 
-    /// Returns the next event for the firmware, if there is one. Call it until it returns `None`. Takes constant time.
+    /// Returns the next event for the firmware, if there is one. Call this method until it returns `None`. Takes
+    /// constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -372,7 +373,8 @@ impl Relay {
         self.node.persisted(record);
     }
 
-    /// Passes the votes on views to `store` if they are not stored yet. If `store` returns true, they count as stored.
+    /// Passes the votes on views to `store` if they are not stored yet. If `store` returns true, the votes count as
+    /// stored.
     ///
     /// See [`unpersisted`](Self::unpersisted).
     pub fn persist(&mut self, mut store: impl FnMut(&ViewRecord) -> bool) {
@@ -461,8 +463,8 @@ impl Relay {
 
     /// Returns false if the drone and a neighbour are in the wrong order along x.
     ///
-    /// Only a neighbour that flies to setpoints counts. The pilot must first fly the drone past that neighbour, in the
-    /// direction of x. `Autopilot::exchange` passes this value to the autopilot link.
+    /// Only a neighbour that flies to setpoints counts. The pilot must first fly the drone past that neighbour along x.
+    /// `Autopilot::exchange` passes this value to the autopilot link.
     pub fn is_ready(&self) -> bool {
         let wrong = |side| self.hold_reason(side) == Some(HoldReason::Order);
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
@@ -478,8 +480,8 @@ impl Relay {
 
     /// Returns the direction from the setpoint to the next node at `side`: a relay, Tx or Rx.
     ///
-    /// `None` without a setpoint, and while the position of that relay is unknown. Relays send their positions only
-    /// if they have a guard.
+    /// `None` without a setpoint, and while the next node is a relay of unknown position. Relays send their positions
+    /// only if they have a guard.
     pub fn bearing(&self, side: Side) -> Option<Bearing> {
         Bearing::between(self.setpoint()?, self.node.place_toward(side)?)
     }
@@ -498,8 +500,8 @@ impl Relay {
     /// it.
     ///
     /// The slots of all hops fill the frame. They change when the result of an agreement reaches this relay: from the
-    /// last relay to the leader, hop by hop. Until it has passed all relays, some have the new slots, and the others
-    /// the old ones or none. [`Event::Converged`] reports that this relay has agreed.
+    /// last relay to the leader, hop by hop. Until it has passed all relays, some relays have the new slots, and the
+    /// remaining relays have the old slots or none. [`Event::Converged`] reports that this relay has agreed.
     pub fn slot_shares(&self) -> Option<SlotShares> {
         self.node.slot_shares()
     }
@@ -527,7 +529,7 @@ impl Relay {
 
     /// Returns true while this relay is passive, because a second node with its number has precedence.
     ///
-    /// Each node draws a random claim number at its start. Of two nodes with one node number, the larger epoch has
+    /// Each node draws a random claim number at its start. Of two nodes with the same node number, the larger epoch has
     /// precedence, then the larger claim number. A passive relay has no setpoint and takes no part in the protocol. It
     /// becomes active once the other node has been silent for twice `Settings::dead_after`, or when
     /// [`clear_duplicate_index`](Self::clear_duplicate_index) is called.
@@ -572,12 +574,12 @@ impl Relay {
 
     /// Returns the node numbers of the neighbours toward Tx and toward Rx; `None` for no neighbour.
     ///
-    /// A node number is the index with which a relay was configured. View changes do not change it.
+    /// A node number is the index with which a relay was configured. View changes do not alter this number.
     pub fn neighbours(&self) -> [Option<u16>; 2] {
         self.node.neighbours()
     }
 
-    /// Returns the active mission. Its number of relays is that of the accepted view.
+    /// Returns the active mission. The number of relays in this mission is that of the accepted view.
     pub fn mission(&self) -> &Mission {
         &self.node.member().mission
     }
@@ -618,8 +620,8 @@ impl Relay {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns the reason why the last measurements gave no estimate of the interferer. `None` if they gave one, and at
-    /// all relays except the leader (the relay that starts the search).
+    /// Returns the reason why the last measurements gave no estimate of the interferer. `None` if they gave an
+    /// estimate, and at all relays except the leader (the relay that starts the search).
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
@@ -789,7 +791,7 @@ impl Relay {
     ///
     /// From now on the relay requests to leave only if the firmware calls [`leave`](Self::leave), or if the margin
     /// becomes too small. The margin is the remaining flight time minus the time of the way home (`handle_endurance`).
-    /// It is too small if it is below the usual limit, and also below half of the margin at this call.
+    /// The margin is too small if it is below the usual limit, and also below half of the margin at this call.
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.override_endurance(now, true);

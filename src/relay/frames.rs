@@ -98,8 +98,8 @@ fn receive_signed(
     side: Side,
     frame: &Opened<'_>,
 ) {
-    // A passive relay waits until it receives the other node itself. Neighbours also repeat the nonce of a node that is
-    // gone.
+    // A passive relay waits until it receives the duplicate's frames directly. Neighbours also repeat the nonce of a
+    // node that is gone.
     if let Some(rival) = rival
         && !node.is_passive()
     {

@@ -62,8 +62,8 @@ pub struct SerialLink<P, D = NoPin> {
     clock: MonotonicClock,
     /// Last time at which the port accepted a byte, or at which a byte entered the empty queue.
     moved_at: Instant,
-    /// Number of bytes written by the last poll. Their transmission time counts from the next poll, because the exact
-    /// time of writing is unknown.
+    /// Number of bytes written by the last poll. The transmission time of these bytes counts from the next poll,
+    /// because the exact time of writing is unknown.
     uncounted: u32,
     /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
@@ -106,7 +106,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Sets the driver-enable pin high, if there is one. Returns false if that fails: then no bytes may be sent.
+    /// Sets the driver-enable pin high, if there is one. Returns false on failure: then no bytes may be sent.
     fn raise(&mut self) -> bool {
         if let Some(pin) = &mut self.pin
             && self.level != Some(true)
@@ -149,7 +149,7 @@ impl<P, D> SerialLink<P, D> {
         &self.stats
     }
 
-    /// Returns the port, for example to set another baud rate by its driver.
+    /// Returns the port, for example to set a new baud rate by its driver.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
@@ -272,7 +272,7 @@ pub struct SerialStats {
     pub parity: u32,
     /// Number of bytes that the serial port received with noise on the line.
     pub noise: u32,
-    /// Number of reads from the serial port that failed for another reason.
+    /// Number of reads from the serial port that failed for a reason not counted above.
     pub other: u32,
     /// Number of failed writes, and of failed queries whether all bytes have left the port. Failed writes are repeated.
     pub write: u32,

@@ -169,8 +169,8 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {
-            /// Moves all bytes that can be moved. Returns the time by which it must be called again, always later than
-            /// `now`.
+            /// Moves all bytes that can be moved. Returns the time by which `poll` must be called again, always later
+            /// than `now`.
             ///
             /// Work: at most 64 bytes per port through [`Relay::handle_bytes`], one [`Relay::handle_timeout`], and the
             /// relay's pending frames; for a shared port, as many as fit.

@@ -50,7 +50,7 @@ pub trait SerialPort {
     fn has_left(&mut self) -> Result<Option<bool>, Fault>;
 }
 
-/// Port with [`embedded_hal_nb`] traits. It moves one byte per call, and can report that the last byte has left.
+/// Port with [`embedded_hal_nb`] traits. This port moves one byte per call, and can report that the last byte has left.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Nb<S>(pub S);
 

@@ -100,8 +100,8 @@ impl<F: FnMut()> Pend for F {
     }
 }
 
-/// Byte queues between an interrupt and the main loop, one for each direction. They hold up to `IN` - 1 received
-/// bytes, and up to `OUT` - 1 bytes to send.
+/// Byte queues between an interrupt and the main loop, one to receive and one to send. The queues hold up to `IN` - 1
+/// received bytes, and up to `OUT` - 1 bytes to send.
 ///
 /// `OUT` should exceed the longest frame, [`MAX_FRAME`](crate::wire::frame::MAX_FRAME), so that the main loop can
 /// sleep while the frame is sent.
@@ -288,7 +288,8 @@ const fn decode(code: u16) -> Result<u8, Fault> {
     }
 }
 
-/// Atomic cell of a ring buffer. Its memory ordering is relaxed, because the ring's indices synchronise the access.
+/// Atomic cell of a ring buffer. Accesses use relaxed memory ordering, because the ring's indices synchronise the
+/// access.
 pub(super) trait AtomicSlot {
     type Item: Copy;
 

@@ -28,7 +28,7 @@ pub struct Config {
     pub method: Method,
     /// Settings for measuring the interference; `None` for no measurement.
     pub measure: Option<Measure>,
-    /// Settings for estimating an unknown interferer from measurements; `None` if it is not estimated.
+    /// Settings for estimating an unknown interferer from measurements; `None` without such an estimation.
     pub listen: Option<Listen>,
     /// Tx and Rx positions, and the drone's speed limit; `None` without an autopilot. `uav_relay::flight::course`
     /// checks them.

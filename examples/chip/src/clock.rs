@@ -18,7 +18,7 @@ use crate::registers::{Register, Registers};
 /// Clock hardware of a board: crystal and over-drive.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ClockHardware {
-    /// Crystal or external clock of the board, if it has one.
+    /// Crystal or external clock of the board, if the board has one.
     pub crystal: Option<Crystal>,
     /// True for a chip with the over-drive that 180 MHz needs: the STM32F446.
     pub over_drive: bool,
@@ -234,7 +234,7 @@ pub fn cache_flash(chip: &mut impl Registers) {
     cache(chip, wait_states);
 }
 
-/// Switches the core to the undivided HSI; returns false if that fails.
+/// Switches the core to the undivided HSI; returns false on failure.
 fn back_to_hsi(chip: &mut impl Registers) -> bool {
     chip.modify(Register::ClockControl, 0, HSI_ON);
     if !chip.wait(Register::ClockControl, HSI_READY, HSI_READY, POLLS) {
@@ -260,7 +260,7 @@ fn off(chip: &mut impl Registers) -> bool {
     chip.wait(Register::ClockControl, PLL_READY, 0, POLLS)
 }
 
-/// Starts the PLL, which must be off; returns false if that fails.
+/// Starts the PLL, which must be off; returns false on failure.
 ///
 /// `divisor` is the source's frequency divided by 2 MHz. `scale` is the voltage scale in PWR_CR.
 fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Pll, scale: u32) -> bool {
@@ -284,7 +284,7 @@ fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Pll, scal
         })
 }
 
-/// Switches the core to the running PLL; returns false if that fails.
+/// Switches the core to the running PLL; returns false on failure.
 fn switch(chip: &mut impl Registers) -> bool {
     if !cache(chip, WAIT_STATES) {
         return false;

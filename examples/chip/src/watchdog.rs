@@ -42,7 +42,7 @@ const FEED: u32 = 0xAAAA;
 /// Maximum number of status reads until the settings take effect. They take effect within 0.3 ms.
 const POLLS: u32 = 10_000;
 
-/// Starts the watchdog, which nothing but a reset can stop. It pauses while a debugger halts the core. Bounded work.
+/// Starts the watchdog, which only a reset can stop. The watchdog pauses while a debugger halts the core. Bounded work.
 pub fn start(chip: &mut impl Registers) {
     chip.modify(Register::DebugFreeze, 0, 1 << 12);
     chip.write(Register::WatchdogKey, START);

@@ -19,12 +19,12 @@ pub const WORDS: usize = 1;
 
 /// Key of the journal for epochs: a constant.
 ///
-/// With a key that depends on the configuration block, a changed block would reset the epoch, which must never fall.
+/// If the key depended on the configuration block, a changed block would reset the epoch, which must never fall.
 pub const KEY: u32 = 0;
 
 /// Returns the epoch of this start, and true if it was stored.
 ///
-/// It is at least `floor`. `None` once the last epoch, 4294967294, has been used.
+/// The epoch is at least `floor`. The result is `None` once the last epoch, 4294967294, has been used.
 pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> {
     log.tidy();
     let [newest] = log.newest::<WORDS>().unwrap_or([0]);

@@ -21,12 +21,12 @@ pub const BLANK: u32 = u32::MAX;
 /// Number of words of a record besides its payload: sequence number and CRC.
 pub const OVERHEAD: usize = 2;
 
-/// Maximum number of attempts to write a record, each at another place in the flash.
+/// Maximum number of attempts to write a record, each at a new place in the flash.
 const TRIES: usize = 4;
 
 /// Access to two flash sectors, numbered 0 and 1, possibly of different lengths.
 pub trait Flash {
-    /// Returns the number of words in a sector; 0 if there is no such sector.
+    /// Returns the number of words in the sector; 0 if there is no such sector.
     fn words(&self, sector: usize) -> usize;
 
     /// Returns the number of words in use: up to the last word that is not [`BLANK`].
@@ -38,7 +38,7 @@ pub trait Flash {
     /// Erases a sector.
     fn erase(&mut self, sector: usize);
 
-    /// Writes `words` to a sector, from its word `first` on. Returns true if they are read back correctly.
+    /// Writes `words` to a sector, from its word `first` on. Returns true if the words are read back correctly.
     fn write(&mut self, sector: usize, first: usize, words: &[u32]) -> bool;
 }
 
@@ -69,7 +69,7 @@ impl<F: Flash> Flash for &mut F {
 pub enum WhenFull {
     /// The new record is refused.
     Refuse,
-    /// The sector without the newest record is erased, and then takes the new one.
+    /// The sector without the newest record is erased, and then takes the new record.
     Erase,
 }
 
@@ -89,7 +89,7 @@ struct Found {
     room: usize,
 }
 
-/// Newest valid record of a sector. The order is that of the sequence numbers.
+/// Newest valid record of a sector. `Newest` values are ordered by their sequence numbers.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Newest {
     number: u32,
@@ -99,7 +99,7 @@ struct Newest {
 impl<F: Flash> Journal<F> {
     /// Creates a journal whose records have `payload_words` words of payload.
     ///
-    /// Records stored under another `key` are ignored.
+    /// Records that were stored with a different `key` are ignored.
     pub const fn new(flash: F, payload_words: usize, key: u32) -> Self {
         Self {
             flash,
@@ -128,7 +128,8 @@ impl<F: Flash> Journal<F> {
         Some(())
     }
 
-    /// Erases the used sectors without the newest record. Called at a start, to delay the erase in flight.
+    /// Erases the used sectors that do not contain the newest record. Called at a start, so that an erase in flight is
+    /// needed later.
     pub fn tidy(&mut self) {
         let found = self.found();
         let any = found.iter().any(|found| found.newest.is_some());

@@ -46,8 +46,8 @@ impl Views {
     ///
     /// Call it before any other use of the relay, but after a stored upload was restored.
     ///
-    /// `votes_restored` is called for a stored record, with true if the relay accepts it. A relay may reject the
-    /// record of another firmware.
+    /// `votes_restored` is called for a stored record, with true if the relay accepts it. A relay may reject the record
+    /// of a different firmware.
     pub fn resume<F: Flash>(
         relay: &mut Relay,
         now: Instant,

@@ -29,13 +29,13 @@ use super::Line;
 use crate::options::Plan;
 use crate::relay::seed;
 
-/// Silence after which a neighbour is asked for a heartbeat.
+/// Silence of a neighbour after which a heartbeat is requested.
 const PROBE_AFTER: Duration = Duration::from_millis(2_000);
 
 /// Number of remembered own frames, to recognise their echoes.
 const REMEMBERED: usize = 64;
 
-/// Number of damaged frames from which on a wrong data rate is suspected.
+/// Minimum number of damaged frames at which a wrong data rate is suspected.
 const DAMAGED: u32 = 5;
 
 /// Age from which on received data are ignored.
@@ -50,11 +50,11 @@ const STANDS_WITHIN_M: f32 = 5.0;
 /// Data about a neighbour, from frames that name it as their sender.
 #[derive(Clone, Copy, Debug, Default)]
 struct Heard {
-    /// Time of its last frame in this network, to any relay.
+    /// Time of the neighbour's last frame in this network, to any relay.
     received: Option<Instant>,
-    /// Time of its last frame to this relay with a correct authentication tag.
+    /// Time of the neighbour's last frame to this relay with a correct authentication tag.
     verified: Option<Instant>,
-    /// Time of its last message that confirms that it receives this relay.
+    /// Time of the neighbour's last message that confirms that it receives this relay.
     hears: Option<Instant>,
     /// True if the neighbour's drone flies.
     flies: bool,
@@ -62,7 +62,7 @@ struct Heard {
     takes_part: bool,
     /// First position that the neighbour reported while its relay did not control the drone, if any.
     stands: Option<Placement>,
-    /// Digest of its mission; `None` if not received yet.
+    /// Digest of the neighbour's mission; `None` if not received yet.
     mission: Option<u16>,
     /// Number of frames signed with a wrong key.
     forged: u32,
@@ -71,7 +71,7 @@ struct Heard {
     replayed: u32,
 }
 
-/// Port toward neighbours. `received` is an incomplete frame; `outgoing` are bytes not sent yet.
+/// Port toward neighbours. `received` contains an incomplete frame, `outgoing` the bytes that are not sent yet.
 struct Wire {
     port: Port,
     tty: Tty,
@@ -436,7 +436,7 @@ fn decoded(frame: &[u8]) -> Option<(Header, Content)> {
     }
     let opened = open(deframer.push(*last)?.ok()?).ok()?;
     let content = if opened.handshake {
-        // After the sender's nonce follows the receiver's, whose upper half is its epoch.
+        // The sender's nonce is followed by the receiver's nonce, whose upper half is the receiver's epoch.
         let epoch = opened.body.get(12..16).and_then(<[u8]>::first_chunk);
         Content::Handshake(u32::from_le_bytes(*epoch?))
     } else {

@@ -23,8 +23,8 @@ pub(crate) fn unmask(interrupt: Interrupt) {
 
 /// Returns a seed that differs between boards and starts.
 ///
-/// After power-up it is a hash of the noise in the RAM. After a reset it is a hash of the RAM's content, which
-/// includes the last seed. It does not use the chip's unique number, because the emulator has none.
+/// After power-up the seed is a hash of the noise in the RAM. After a reset it is a hash of the RAM's content, which
+/// includes the last seed. The chip's unique number is not used, because the emulator has none.
 pub(crate) fn seed() -> u32 {
     const WORDS: usize = 64;
     #[unsafe(link_section = ".uninit.leftover")]
@@ -66,8 +66,8 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 #[cfg(not(prove_no_panic))]
 use panic_halt as _;
 
-// defmt's linker script sorts the strings of the log, so it is linked only with a log. It is linked as a library,
-// because the linker finds that in defmt's build directory.
+// defmt's linker script sorts the strings of the log, so it is linked only with a log. The script is linked as a
+// library, because the linker finds a library in defmt's build directory.
 #[cfg(feature = "defmt")]
 #[link(name = "defmt.x", kind = "dylib", modifiers = "+verbatim")]
 unsafe extern "C" {}

@@ -20,7 +20,7 @@ pub(crate) struct Drone {
     pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
-/// Creates the drone of the configuration block; `None` if it cannot fly.
+/// Creates the drone of the configuration block; `None` if the drone cannot fly.
 ///
 /// Neither [`switch_on`] nor this function is inlined, so that their stack frames are freed.
 #[inline(never)]

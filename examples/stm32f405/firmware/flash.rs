@@ -96,7 +96,7 @@ impl Sector {
         number.to_le_bytes()[0]
     }
 
-    /// Erases the sector. This stops the CPU for up to 2 s, depending on its size.
+    /// Erases the sector. This stops the CPU for up to 2 s, depending on the sector's size.
     #[inline(never)]
     fn erase(self) {
         let flash = unlocked();
@@ -119,7 +119,7 @@ impl Sector {
         flash.acr().modify(|_, w| w.dcen().set_bit());
     }
 
-    /// Writes words from word `first` on; returns true if they are read back correctly.
+    /// Writes words from word `first` on; returns true if the words are read back correctly.
     ///
     /// Stops the CPU for about 16 microseconds a word.
     #[inline(never)]

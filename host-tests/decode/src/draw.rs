@@ -208,7 +208,7 @@ impl<'s> Draw<'s> {
         number << 10 | node
     }
 
-    /// Draws fields with arbitrary numbers, in range or not. They can always be encoded.
+    /// Draws fields with arbitrary numbers, in range or not. Such fields can always be encoded.
     pub fn arbitrary<'f>(&mut self, fields: &'f [Field]) -> Fields<'f> {
         let draw = fields.iter().map(|field| (field, self.any(&field.kind)));
         Fields(draw.collect())

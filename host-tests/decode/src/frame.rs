@@ -27,7 +27,7 @@ pub struct Frame<'f> {
     pub fields: Fields<'f>,
     /// Signed part of the frame (header and body), and the frame's authentication tag, if it has one.
     pub tag: Option<(Vec<u8>, [u8; TAG])>,
-    /// Reason why a receiver rejects the frame, if it does.
+    /// Reason why a receiver rejects the frame; `None` if it accepts the frame.
     pub refusal: Option<Refusal>,
 }
 

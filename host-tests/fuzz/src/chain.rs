@@ -71,7 +71,7 @@ struct Chain {
     mission: Mission,
     members: Vec<Member>,
     now: Instant,
-    /// Random seed of the next relay that starts. It rises at every start.
+    /// Random seed of the next relay that starts. The seed rises at every start.
     seed: u32,
     version: u16,
 }

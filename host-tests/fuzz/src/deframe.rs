@@ -10,7 +10,8 @@ use super::setting;
 
 /// Fuzz target. Reads `data` as two lengths and a byte stream.
 ///
-/// A deframer receives the stream byte by byte. One relay receives it as a whole, another in pieces of these lengths.
+/// A deframer receives the stream byte by byte. One relay receives the stream as a whole, and a second relay in pieces
+/// of these lengths.
 ///
 /// # Panics
 /// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it

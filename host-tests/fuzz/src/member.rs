@@ -27,14 +27,14 @@ const HANDSHAKE_BODY: usize = 2 * NONCE + 1;
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Member {
     key: [u8; 32],
-    /// Nonce of the neighbour. It rises at every start.
+    /// Nonce of the neighbour. The nonce rises at every start.
     own: Vec<u8>,
     relay: Vec<u8>,
     counter: u32,
 }
 
 impl Member {
-    /// Creates a neighbour from the tested relay's handshake `frame`; `None` if it is no handshake.
+    /// Creates a neighbour from the tested relay's handshake `frame`; `None` if `frame` is no handshake.
     pub fn from_handshake(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;
@@ -86,7 +86,8 @@ impl Member {
         self.frame(header, SIGNED, &relay, body)
     }
 
-    /// Returns this neighbour's handshake before COBS. It requests an answer if the tested relay's nonce is unknown.
+    /// Returns this neighbour's handshake before COBS. The handshake requests an answer if the tested relay's nonce is
+    /// unknown.
     pub fn handshake(&mut self, header: Header) -> Vec<u8> {
         let asks = u8::from(self.relay.iter().all(|&byte| byte == 0));
         let body = [&*self.own, &*self.relay, &[asks]].concat();

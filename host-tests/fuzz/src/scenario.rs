@@ -7,7 +7,7 @@ use uav_relay_scenario::{AirGround, Field, Interference, Scenario};
 
 const RELAYS: [u16; 4] = [1, 3, 8, 1000];
 
-/// Fuzz target. Reads `data` as the text of a scenario file; ignores it if it is not UTF-8.
+/// Fuzz target. Reads `data` as the text of a scenario file; ignores any text that is not UTF-8.
 ///
 /// # Panics
 /// An error text has several lines, a number is out of range, or a mission has a number that is not finite.

@@ -25,10 +25,10 @@ const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
 const MOST_EVENTS: usize = 14;
 
-/// Length of the shortest frame whose CRC is computed, bytes on the wire: header, no body, CRC.
+/// Minimum length of a frame whose CRC is computed, bytes on the wire: header, no body, CRC.
 const LEAST_CHECKED: usize = 16;
 
-/// Length of the shortest frame with a message, a Busy, bytes on the wire.
+/// Minimum length of a frame with a message (a Busy message), bytes on the wire.
 const LEAST_MESSAGE: usize = 19;
 
 /// Frame sent by a relay.
@@ -53,7 +53,7 @@ pub struct Watched {
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Tx and Rx positions in the mission in use, if it has any.
+    /// Tx and Rx positions in the mission in use, if the mission has any.
     sites: Option<Sites>,
     /// Distance from Tx to Rx in the mission loaded before flight, m.
     loaded_m: f32,
@@ -274,7 +274,7 @@ impl Watched {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
         assert!(told || setpoint == self.setpoint, "moved in silence");
-        // A relay has no setpoint while it is passive, and if its Tx and Rx positions have changed since the last
+        // A relay has no setpoint while it is passive, and after its Tx and Rx positions have changed since the last
         // agreement.
         let moved = self.sites != self.relay.sites();
         let silent = self.relay.is_passive() || moved;

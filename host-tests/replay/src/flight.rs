@@ -33,7 +33,7 @@ pub struct Loaded {
     pub axis: Option<Axis>,
 }
 
-/// Period in which a relay sent no report.
+/// Period in which one relay, or all relays, sent no report.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Loss {
     /// Number of the silent relay; 0 if all were silent.
@@ -262,7 +262,7 @@ struct Recorder<'a> {
     worst_db: Option<f64>,
     /// Silences that have not ended yet, by relay number.
     open: BTreeMap<u16, Loss>,
-    /// Last time at which no relay reported.
+    /// Last time at which all relays were silent.
     silent_at: Instant,
     /// Time of the first agreement, s, and numbers of snapshots since then.
     ///

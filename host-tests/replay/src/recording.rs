@@ -36,8 +36,8 @@ fn join(comment: &mut String, more: &str) {
     comment.push_str(more);
 }
 
-/// Removes the frames that `is_kept` rejects. Their comments go to the next kept frame, or at the end to the last
-/// one.
+/// Removes the frames that `is_kept` rejects. The comments of removed frames go to the next kept frame, or at the end
+/// to the last kept frame.
 ///
 /// `last` is a comment on packets after the last frame.
 pub(crate) fn retain(frames: &mut Vec<Frame>, last: &str, mut is_kept: impl FnMut(&Frame) -> bool) {

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// Area on the ground. Its boundary does not cross itself.
+/// Area on the ground. The boundary does not cross itself.
 ///
 /// Points are [x, y], m. x is the distance from Tx toward Rx, and y the offset to the right as seen from Tx.
 #[derive(Debug, Clone, PartialEq)]
@@ -181,7 +181,7 @@ impl Area {
 }
 
 impl NoFly {
-    /// Returns how deep a relay is inside the no-fly area, m; `None` if it is outside.
+    /// Returns how deep a relay is inside the no-fly area, m; `None` if the relay is outside.
     ///
     /// The depth is the smallest of three distances: to the boundary, to the lowest altitude and to the highest
     /// altitude.

@@ -12,7 +12,7 @@ use super::keys::SECTIONS;
 use crate::check;
 use crate::error::{Problem, ScenarioError};
 
-/// Default network number of all tools. Relays ignore frames with another network number.
+/// Default network number of all tools. Relays ignore frames with any other network number.
 pub const NETWORK: u16 = 1;
 
 /// Relative tolerance of the target SIR on companion computers. No option changes it.
@@ -36,7 +36,7 @@ pub struct Deployment {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Network {
-    /// Network number, 0 to 65535. Relays ignore frames with another number.
+    /// Network number, 0 to 65535. Relays ignore frames with any other number.
     pub id: Option<u16>,
     /// Number of relays in the chain, 1 to 1000.
     pub relays: Option<u16>,
@@ -48,7 +48,7 @@ pub struct Network {
     pub baud: Option<u32>,
     /// Silence of a neighbour after which the relay requests a heartbeat, ms, 1 to 3600000.
     pub probe_after_ms: Option<u32>,
-    /// Silence of a neighbour after which it counts as lost, ms, 1 to 3600000.
+    /// Silence after which a neighbour counts as lost, ms, 1 to 3600000.
     pub dead_after_ms: Option<u32>,
 }
 
@@ -63,13 +63,13 @@ pub struct Companion {
     pub upstream: Option<PathBuf>,
     /// Serial port of the link to the neighbour toward the receiver.
     pub downstream: Option<PathBuf>,
-    /// Serial port of a radio channel that all relays share. It replaces `upstream` and `downstream`.
+    /// Serial port of a radio channel that all relays share. This port replaces `upstream` and `downstream`.
     pub shared: Option<PathBuf>,
     /// File that stores the epoch: a start counter that protects against replayed frames.
     pub epoch_file: Option<PathBuf>,
     /// File that stores the newest mission that was uploaded to the relay.
     pub upload_file: Option<PathBuf>,
-    /// File that stores the relay's votes on the membership. It prevents a second vote after a reboot.
+    /// File that stores the relay's votes on the membership. The file prevents a second vote after a reboot.
     pub view_file: Option<PathBuf>,
     /// Autopilot: a serial port, or a UDP address as parsed by [`Endpoint`](crate::endpoint::Endpoint).
     pub autopilot: Option<String>,
@@ -111,7 +111,7 @@ pub struct Ground {
     pub tty: Option<PathBuf>,
     /// True if the port leads to a channel that all relays share.
     pub shared: Option<bool>,
-    /// End of the chain at which the ground station is: `tx` (transmitter) or `rx` (receiver).
+    /// End of the chain at which the ground station stands: `tx` (transmitter) or `rx` (receiver).
     pub end: Option<String>,
     /// File that stores the epoch, a start counter that prevents replays of frames from earlier starts.
     pub epoch_file: Option<PathBuf>,

@@ -83,7 +83,7 @@ fn number(text: &str) -> Option<u16> {
     number.filter(|_| is_plain)
 }
 
-/// Returns the default local port for an autopilot at `port`; `None` if it would exceed 65535.
+/// Returns the default local port for an autopilot at `port`; `None` if that port would exceed 65535.
 fn default_local(port: u16) -> Option<u16> {
     if PX4_LISTENS.contains(&port) {
         Some(port - PX4_LISTENS.start() + PX4_SENDS_TO)

@@ -123,7 +123,7 @@ pub struct Fit {
     pub best_power: BestPower,
 }
 
-/// Returns the single interferer that best replaces all interferers of `scene`; `None` if it has none.
+/// Returns the single interferer that best replaces all of `scene`; `None` if the scene has no interferers.
 ///
 /// The search usually evaluates about 1 500 positions with 400 quadrature points each, 600 positions with 4 000, and
 /// one with 60 000. The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in
@@ -460,7 +460,7 @@ impl Raster {
         self.nodes.is_empty()
     }
 
-    /// Returns the area that the quadrature points cover, m^2, or the length, m, if they are on a line.
+    /// Returns the area that the quadrature points cover, m^2; their length, m, if all are on a line.
     pub fn area(&self) -> f64 {
         self.area
     }
@@ -548,12 +548,12 @@ fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     median
 }
 
-/// Coordinate at which a sampled function changes fastest; a grid has its smallest cells there.
+/// Coordinate at which a sampled function changes fastest. A grid has its smallest cells at this point.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
     /// Coordinate of the fastest change, m: an x or an altitude.
     pub at: f64,
-    /// Length over which the function changes noticeably at `at`, m. It determines the size of the cells.
+    /// Length over which the function changes noticeably at `at`, m. This length determines the size of the cells.
     pub width: f64,
 }
 

@@ -96,8 +96,8 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Creates a key that is required if the table has none of the keys `others`. It must not be given together with any of
-/// them.
+/// Creates a key that is required if the table has none of the keys `others`. The key must not be given together with
+/// any of them.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),

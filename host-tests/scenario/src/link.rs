@@ -150,7 +150,7 @@ pub struct Link {
     pub model: RateModel,
 }
 
-/// Data link of a chain with a known bandwidth. It computes data rates from SIRs.
+/// Data link of a chain with a known bandwidth. This type computes data rates from SIRs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radio {
     /// Medium access and spectral efficiency. The bandwidth in this `Link` is ignored.
@@ -210,7 +210,7 @@ impl Radio {
         })
     }
 
-    /// Returns the data rate of a hop while it sends, bit/s, from its linear SIR. Interference counts as noise.
+    /// Returns the data rate of a hop while it sends, bit/s, from its linear SIR. The interference is treated as noise.
     pub fn hop_bps(&self, sir: f64) -> f64 {
         self.bandwidth_hz * self.link.model.bits_per_hz(sir)
     }

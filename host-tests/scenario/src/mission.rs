@@ -76,8 +76,8 @@ impl std::error::Error for Refusal {}
 
 /// Converts a scenario to a mission of `uavs` relays, and the profiles of relays that differ.
 ///
-/// A relay differs if it has an altitude or a power of its own. Its index is counted from 1. Several interferers are
-/// replaced by one hypothetical interferer.
+/// A relay differs if it has an altitude or a power of its own. The index of a relay is counted from 1. Several
+/// interferers are replaced by one hypothetical interferer.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -161,7 +161,7 @@ pub fn mission(
 
 /// Returns `mission` with the fitted slots of the scenario, if it has any.
 ///
-/// Relays use them only with the method `joint`; with other methods their slots are equal.
+/// Relays use fitted slots only with the method `joint`; with other methods all slots are equal.
 ///
 /// # Errors
 /// [`Refusal::Steps`] for fitted slots with a table of rate steps; [`Refusal::Mission`] if the SNR gap is out of range.

@@ -69,7 +69,8 @@ pub struct Scene {
     pub areas: BTreeMap<usize, Area>,
     /// Least and greatest altitude of each interferer, m, by index in `sources`; 0 if it is not in the map.
     ///
-    /// For each receiver the interferer is at the altitude within these limits that is nearest to the receiver's.
+    /// For each receiver the interferer is at that altitude within these limits which is nearest to the receiver's
+    /// altitude.
     pub heights_m: BTreeMap<usize, [f64; 2]>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
     pub mu_los: f64,

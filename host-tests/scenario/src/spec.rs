@@ -53,7 +53,7 @@ pub struct Scenario {
     pub masts_m: BTreeMap<usize, f64>,
     /// No-fly areas, for the planner.
     pub no_fly: Vec<NoFly>,
-    /// Settings for relays that locate the interferer by measurements; `None` if they do not.
+    /// Settings for relays that locate the interferer by measurements; `None` if relays do not locate it.
     ///
     /// [`Self::interference`] is then their initial knowledge, if any.
     pub listen: Option<ListenSpec>,
@@ -110,7 +110,7 @@ impl TerrainSpec {
 /// Line from Tx to Rx in geographic coordinates, and the geographic positions of its ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// Coordinate system of the line from Tx to Rx. It converts between geographic and local positions.
+    /// Coordinate system of the line from Tx to Rx. This type converts between geographic and local positions.
     pub axis: Axis,
     /// Geographic positions of the transmitter Tx and the receiver Rx.
     pub sites: [Geodetic; 2],
@@ -219,8 +219,8 @@ impl Noise {
 
     /// Returns true if there is noise, and the antenna gains of the relays and of Rx differ.
     ///
-    /// The mission's only noise power is that for the lower gain. It is too high for the receivers with the higher
-    /// gain.
+    /// The mission's only noise power is that for the lower gain. That noise power is too high for the receivers with
+    /// the higher gain.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
@@ -280,7 +280,7 @@ pub struct BetaPoint {
     pub beta: f64,
 }
 
-/// Altitude and power of one relay, if they differ from the common values. At least one is set if read from a file.
+/// Altitude and power of one relay that differ from the common values. At least one of them is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
     /// Fixed altitude of this relay, m, 0.1 to 1e4; `None` for the common altitude. Values outside of `altitude_min_m`
@@ -307,8 +307,8 @@ impl Default for ChannelSpec {
 impl Default for Scenario {
     /// Returns the paper's multi-hop scenario.
     ///
-    /// Tx and Rx are 1 km apart, relays at 20 m altitude and at least 4 m apart. One interferer of 80 W is halfway
-    /// between Tx and Rx, 400 m to the right of their line.
+    /// The distance from Tx to Rx is 1 km. The relays fly at 20 m altitude, with a minimum separation of 4 m. One
+    /// interferer of 80 W is halfway between Tx and Rx, 400 m to the right of their line.
     fn default() -> Self {
         Self {
             line: None,

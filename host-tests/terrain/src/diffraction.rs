@@ -23,7 +23,7 @@ pub const EARTH_M: f64 = 8.5e6;
 /// Speed of light, m/s.
 pub const LIGHT_M_S: f64 = 299_792_458.0;
 
-/// Point of a profile: distance along the ground from the first antenna, and ground height, m.
+/// Point of a profile: distance along the ground from the first antenna, m, and ground height, m.
 pub type Point = [f64; 2];
 
 /// Electrical properties of the ground, and the polarisation of the antennas.
@@ -47,7 +47,7 @@ impl Default for Surface {
     }
 }
 
-/// Returns the diffraction loss of the path over `profile`, dB. It is the same in both directions.
+/// Returns the diffraction loss of the path over `profile`, dB. The loss is the same if the other antenna sends.
 ///
 /// `ends_m` are the heights of the two antennas above the sea, at the ends of the profile. The profile has at least two
 /// points, with increasing distances from 0 on. The loss is at least 0.
@@ -94,7 +94,8 @@ fn bullington_db(
     let inner = profile.filter(|[d, _]| *d > 0.0 && *d < length);
     let raised = inner.map(|[d, height]| (d, height + d * (length - d) / (2.0 * EARTH_M)));
     let slope = (to - from) / length;
-    // Diffraction parameter of an edge at the distance d. `above` is its height above the line between the antennas.
+    // Diffraction parameter of an edge at the distance d. `above` is the edge's height above the line between the
+    // antennas.
     let parameter =
         |d: f64, above: f64| above * (2.0 * length / (wavelength * d * (length - d))).sqrt();
     let above = |d: f64, height: f64| height - (from + slope * d);
@@ -106,10 +107,10 @@ fn bullington_db(
     } else {
         let fall = raised.map(|(d, height)| (height - to) / (length - d));
         let fall = fall.fold(f64::NEG_INFINITY, f64::max);
-        // The horizons meet between the antennas, or at an antenna that is below the ground.
+        // The horizon lines of the two antennas meet between them, or at an antenna that is below the ground.
         let meet = ((to - from + fall * length) / (rise + fall))
             .clamp(1e-6 * length, (1.0 - 1e-6) * length);
-        // If the horizons have no single meeting point, the ground just touches the line of sight.
+        // If the horizon lines have no single meeting point, the ground just touches the line of sight.
         if meet.is_nan() {
             0.0
         } else {
@@ -140,7 +141,7 @@ fn smooth_heights_m(profile: &[Point], [from, to]: [f64; 2]) -> [f64; 2] {
         (2.0 * v1 * length - v2) / (length * length),
         (v2 - v1 * length) / (length * length),
     ];
-    // The highest obstacle, and the steepest angles to obstacles, above the line between the antennas.
+    // These are the highest obstacle, and the steepest angles to obstacles, above the line between the antennas.
     let mut highest: f64 = 0.0;
     let mut angles: [f64; 2] = [0.0; 2];
     for [d, h] in profile.iter().filter(|[d, _]| *d > 0.0 && d < length) {
@@ -163,14 +164,14 @@ fn smooth_heights_m(profile: &[Point], [from, to]: [f64; 2]) -> [f64; 2] {
 
 /// Returns the diffraction loss of a smooth spherical earth, dB.
 ///
-/// `heights` are the heights of the antennas above this earth, m.
+/// `heights` are the heights of the antennas above this sphere, m.
 fn spherical_db(length: f64, heights: [f64; 2], wavelength: f64, surface: Surface) -> f64 {
     let [h1, h2] = heights;
     let roots = h1.sqrt() + h2.sqrt();
     if length >= (2.0 * EARTH_M).sqrt() * roots {
         return first_term_db(length, heights, wavelength, EARTH_M, surface);
     }
-    // Point at which the line of sight is closest to the earth, and its clearance there.
+    // This is the point at which the line of sight is closest to the earth, and its clearance there.
     let c = (h1 - h2) / (h1 + h2);
     let m = length * length / (4.0 * EARTH_M * (h1 + h2));
     let inner = 3.0 * c / 2.0 * (3.0 * m / (m + 1.0).powi(3)).sqrt();
@@ -185,7 +186,7 @@ fn spherical_db(length: f64, heights: [f64; 2], wavelength: f64, surface: Surfac
     if clearance > required {
         return 0.0;
     }
-    // Earth radius at which the line of sight just touches the earth.
+    // This is the earth radius at which the line of sight just touches the earth.
     let touching = 0.5 * (length / roots).powi(2);
     let loss = first_term_db(length, heights, wavelength, touching, surface);
     (1.0 - clearance / required) * loss.max(0.0)

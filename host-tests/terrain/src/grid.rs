@@ -18,10 +18,10 @@ use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
-/// Range of valid heights of the ground, m. Other values in an elevation file mean that the height is unknown.
+/// Range of valid heights of the ground, m. Any other value in an elevation file means that the height is unknown.
 const HEIGHTS: std::ops::RangeInclusive<f64> = -500.0..=9000.0;
 
-/// Largest relative difference of cell size between two files of one grid.
+/// Largest difference of cell size between two files of one grid, as a fraction of the size.
 const SAME_CELL: f64 = 1e-6;
 
 /// Largest offset between the grid points of two files, as a fraction of a cell.
@@ -105,7 +105,7 @@ struct Tile {
     cell: [f64; 2],
     /// Coordinates, east then north, of the tile's north-west grid point.
     corner: [f64; 2],
-    /// Column and row of the tile's north-west grid point in the whole grid.
+    /// Column and row, in the whole grid, of the tile's north-west grid point.
     at: [i64; 2],
     columns: usize,
     rows: usize,
@@ -117,7 +117,7 @@ struct Tile {
 /// Height at one grid point, or the reason why it is unknown.
 enum Node<'a> {
     Height(f64),
-    /// The file has an invalid value at this point. The fields are the file and the value.
+    /// The height is unknown: the file has an invalid value at this point. The fields are the file and the value.
     Hole(&'a Tile, f32),
     Outside,
 }
@@ -135,7 +135,8 @@ impl Terrain {
     /// Reads the elevation model in `files`, at least one.
     ///
     /// # Errors
-    /// A text that names the file and the problem: an unreadable or unsupported file, or files of different grids.
+    /// A text that names the file and the problem: an unreadable or unsupported file, or files that belong to different
+    /// grids.
     pub fn load(files: &[impl AsRef<Path>]) -> Result<Self, String> {
         let tiles = files.iter().map(|file| Tile::load(file.as_ref()));
         let mut tiles = tiles.collect::<Result<Vec<_>, _>>()?;
@@ -163,7 +164,7 @@ impl Terrain {
         })
     }
 
-    /// Returns the smaller side of a cell at this latitude, m.
+    /// Returns the length of a cell's shorter side at this latitude, m.
     pub fn cell_m(&self, lat_deg: f64) -> f64 {
         let [east, south] = self.cell;
         match self.system {
@@ -192,7 +193,7 @@ impl Terrain {
         ]
     }
 
-    /// Returns the height at a column and row of [`cells`](Self::cells), m; `None` if it is unknown.
+    /// Returns the height at a column and row of [`cells`](Self::cells), m; `None` for an unknown height.
     pub fn height_at(&self, cells: [f64; 2]) -> Option<f64> {
         let known = |node| {
             let mut nodes = self.tiles.iter().map(|tile| tile.node(node));
@@ -252,7 +253,7 @@ fn interpolated<E>(
     [column, row]: [f64; 2],
     height: impl Fn([i64; 2]) -> Result<f64, E>,
 ) -> Result<f64, E> {
-    // A point at a grid point, apart from rounding, needs no other grid points.
+    // A point that coincides with a grid point, except for rounding, needs no other grid points.
     let split = |at: f64| {
         let whole = (at + 1e-6).floor();
         #[expect(
@@ -286,7 +287,7 @@ impl Tile {
         read.map_err(|problem| format!("{name}: {problem}"))
     }
 
-    /// Returns the column and row of this tile's north-west grid point in another grid.
+    /// Returns the column and row, in the grid of a second tile, of this tile's north-west grid point.
     ///
     /// The error names the property in which the two grids differ.
     fn place_in(
@@ -321,7 +322,7 @@ impl Tile {
     /// Checks that the heights of two overlapping files agree.
     ///
     /// # Errors
-    /// A text with the greatest difference: both files, the place and both heights.
+    /// A text about the greatest difference, with both files, the place and both heights.
     fn agrees_with(&self, other: &Self) -> Result<(), String> {
         let range = |axis: usize, counts: [usize; 2]| {
             let from = [self, other].map(|tile| tile.at.get(axis).copied().unwrap_or_default());
@@ -410,7 +411,7 @@ impl Tile {
     }
 }
 
-/// Reads an SRTM tile. The file name states its position.
+/// Reads an SRTM tile. The file name states the tile's position.
 fn srtm(path: &Path) -> Result<Tile, String> {
     let name = path
         .file_stem()
@@ -496,7 +497,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
                 "has heights in feet: its vertical coordinate system is EPSG {code} (key 4096); allowed: heights in metres above the mean sea level"
             ));
         }
-        // Codes of GeoTIFF 1.0.
+        // These codes are those of GeoTIFF 1.0.
         Some(code @ (4979 | 5001..=5033)) => {
             return Err(format!(
                 "has heights above the ellipsoid: its vertical coordinate system has the code {code} (key 4096); allowed: heights in metres above the mean sea level"

@@ -37,7 +37,7 @@ const APART_M: f64 = 1e-3;
 /// A vertex with a smaller difference is no profile point.
 const VERTEX_M: f64 = 1e-3;
 
-/// Side of a square in which column and row of the elevation model are taken as linear in x and y, m.
+/// Side length of a square in which the model's column and row are taken as linear in x and y, m.
 const SQUARE_M: f64 = 200.0;
 
 /// Largest accepted difference between a site's height in the scenario and in the elevation model, m.
@@ -53,7 +53,7 @@ pub struct Ground<'a> {
     terrain: &'a Terrain,
     axis: Axis,
     step_m: f64,
-    /// Assumed error of the terrain's heights away from Tx and Rx, m.
+    /// Assumed error of the terrain's heights at points far from Tx and Rx, m.
     error_m: f64,
     /// Antennas of Tx and Rx, with their heights.
     pub ends: [Node; 2],
@@ -83,11 +83,11 @@ pub struct Profile {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
-    /// Hop whose line of sight is above the ground by 60 % of the first Fresnel zone's radius or more.
+    /// The line of sight is above the ground by at least 60 % of the first Fresnel zone's radius.
     Clear,
-    /// Hop whose line of sight is above the ground, but by less than a clear hop needs.
+    /// The line of sight is above the ground, but by less than a clear hop needs.
     Grazing,
-    /// Hop whose line of sight is interrupted by the ground.
+    /// The ground interrupts the line of sight.
     Blocked,
 }
 
@@ -145,7 +145,8 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the terrain with `error_m` as the assumed error of its heights. The ground counts as higher by it.
+    /// Returns the terrain with `error_m` as the assumed error of its heights. The ground counts as higher by this
+    /// error.
     ///
     /// The error is 0 at Tx and Rx, because their antennas stand on the same ground. It grows to `error_m` within 100 m
     /// from them.
@@ -154,7 +155,7 @@ impl<'a> Ground<'a> {
         Self { error_m, ..self }
     }
 
-    /// Returns the assumed error of the heights at `x_m`, m. The ground counts as higher by it.
+    /// Returns the assumed error of the heights at `x_m`, m. The ground counts as higher by this error.
     ///
     /// It is 0 at Tx and Rx, and has its full value 100 m away from them.
     pub fn raise_m(&self, x_m: f64) -> f64 {
@@ -182,7 +183,7 @@ impl<'a> Ground<'a> {
 
     /// Returns the point at `x_m`, `y_m` and altitude 0.
     ///
-    /// Altitude 0 is the straight line from the ground at Tx to the ground at Rx.
+    /// Points of altitude 0 are on the straight line from the ground at Tx to the ground at Rx.
     ///
     /// # Errors
     /// A text that names the position, if it is too far from the line Tx-Rx.
@@ -220,7 +221,7 @@ impl<'a> Ground<'a> {
 
     /// Returns the highest ground within `radius_m` of `node`, m above the mean sea level.
     ///
-    /// It includes the assumed error of the heights.
+    /// The result includes the assumed error of the heights.
     ///
     /// # Errors
     /// A text that names a position: the elevation files do not cover it, or have no height there.
@@ -228,8 +229,8 @@ impl<'a> Ground<'a> {
         let raise_m = self.raise_m(node.x_m);
         let mut highest = self.height_m(node.x_m, node.y_m)?;
         if radius_m > 0.0 {
-            // A polygon outside of the circle by at most a centimetre. Inside a cell the ground has no highest point.
-            // So the highest point of the polygon is on an edge or at a node.
+            // The polygon is outside of the circle by at most a centimetre. Inside a cell the ground has no highest
+            // point. So the highest ground in the polygon is on its edge, or at a node of the elevation model.
             let corners = (std::f64::consts::PI * (50.0 * radius_m).sqrt())
                 .ceil()
                 .max(16.0);
@@ -256,8 +257,8 @@ impl<'a> Ground<'a> {
 
     /// Returns points of the ground along the straight line between two positions [x, y].
     ///
-    /// Each point has the distance from the first position and the height, m. The highest and the lowest ground of the
-    /// line are among the points. The assumed error of the heights is not added.
+    /// Each point has the distance from the first position and the height, m. The highest and the lowest point of the
+    /// ground along the line are among them. The assumed error of the heights is not added.
     ///
     /// # Errors
     /// Those of [`height_m`](Self::height_m).
@@ -276,8 +277,8 @@ impl<'a> Ground<'a> {
 
     /// Returns the nodes of the elevation model in a rectangle, as [x, y, height], m.
     ///
-    /// `low` has the least x and y of the rectangle, and `high` the greatest. Nodes are left out if `is_in` returns
-    /// false. The assumed error of the heights is not added.
+    /// `low` has the least x and y of the rectangle, and `high` the greatest. Nodes for which `is_in` returns false are
+    /// left out. The assumed error of the heights is not added.
     ///
     /// # Errors
     /// A text that names a node without a height.
@@ -345,7 +346,7 @@ impl<'a> Ground<'a> {
         Ok(())
     }
 
-    /// Returns the height at the column and row `cells`. They belong to the position [x, y].
+    /// Returns the height at the column and row `cells`. The column and row must be those of the position [x, y].
     fn height_of(&self, cells: [f64; 2], [x_m, y_m]: [f64; 2]) -> Result<f64, String> {
         let known = self.terrain.height_at(cells);
         known.map_or_else(|| self.height_m(x_m, y_m), Ok)
@@ -353,7 +354,8 @@ impl<'a> Ground<'a> {
 
     /// Returns the column and row of the position [x, y].
     ///
-    /// Positions are rounded to 1e-7 degrees, about 1 cm. The result of [`turn`](Self::turn) corrects this.
+    /// Positions are rounded to 1e-7 degrees, about 1 cm. The second argument, from [`turn`](Self::turn), corrects this
+    /// rounding.
     fn cells(&self, [x, y]: [f64; 2], [[a, b], [c, d]]: [[f64; 2]; 2]) -> Result<[f64; 2], String> {
         let point = self.point(x, y)?;
         let (lat, lon) = (f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7);
@@ -402,7 +404,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the points of a profile. Their heights include the assumed error.
+    /// Returns the points of a profile. The heights of the points include the assumed error.
     fn along(&self, [from, to]: [Node; 2], least_steps: f64) -> Result<Vec<Point>, String> {
         let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);
         let length = dx.hypot(dy);
@@ -505,7 +507,7 @@ fn parabola([start, middle, end]: [f64; 3], share: f64) -> f64 {
 
 /// Returns the extremum, a number from 0 to 1, of the parabola through three values at 0, 1/2 and 1.
 ///
-/// `None` if it is not between 0 and 1, or if its value is within a millimetre of the value at 0 or 1.
+/// `None` if the extremum is not between 0 and 1, or if its value is within a millimetre of the value at 0 or 1.
 fn vertex([start, middle, end]: [f64; 3]) -> Option<f64> {
     let slope = 4.0 * middle - 3.0 * start - end;
     let bend = 2.0 * (start + end) - 4.0 * middle;
@@ -564,7 +566,8 @@ impl Profile {
             }
         };
         let all = || self.points.iter().map(at);
-        // At an antenna the Fresnel zone has no radius, so its ends count only if the antenna is below the ground.
+        // At an antenna the Fresnel zone has no radius, so the ends of a hop count only if an antenna is below the
+        // ground.
         let blocked = all().filter(|point| point.state == State::Blocked);
         let blocked = blocked.min_by(|a, b| a.clearance_m.total_cmp(&b.clearance_m));
         let margin = |point: &Clearance| point.clearance_m - point.required_m;

@@ -17,9 +17,9 @@ pub struct HopReport {
     pub state: State,
     /// Height of the line of sight above the worst obstacle, m; below 0 if the hop is blocked.
     pub clearance_m: f64,
-    /// Clearance that a clear hop needs at this obstacle, m.
+    /// Clearance that a clear hop needs at the worst obstacle, m.
     pub required_m: f64,
-    /// Distance of the obstacle from Tx toward Rx, m.
+    /// Distance of the worst obstacle from Tx toward Rx, m.
     pub obstacle_x_m: f64,
     /// Lateral position of the worst obstacle, m.
     pub obstacle_y_m: f64,
@@ -27,13 +27,13 @@ pub struct HopReport {
     pub obstacle_lat_deg: f64,
     /// Longitude of the worst obstacle, degrees.
     pub obstacle_lon_deg: f64,
-    /// Diffraction loss of the hop by Recommendation ITU-R P.526, dB; the same in both directions.
+    /// Diffraction loss of the hop by Recommendation ITU-R P.526, dB; the same from Tx to Rx and back.
     pub diffraction_db: f64,
     /// SIR of the hop in the direction to Rx with its diffraction loss, dB.
     ///
     /// The interference is computed without such a loss.
     pub sir_db: f64,
-    /// SIR of the hop in the direction to Tx with its diffraction loss, dB; absent if it is unknown.
+    /// SIR of the hop in the direction to Tx with its diffraction loss, dB; absent if the SIR is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back_db: Option<f64>,
 }
@@ -58,7 +58,8 @@ pub struct InterfererHeight {
     pub index: usize,
     /// Least and greatest altitude of the interferer's antenna above the straight line Tx-Rx, m.
     ///
-    /// Absent if the elevation files do not cover the interferer. The two values differ if its position is an area.
+    /// Absent if the elevation files do not cover the interferer. The two values differ if the interferer's position is
+    /// an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub altitude_m: Option<[f64; 2]>,
 }
@@ -73,13 +74,13 @@ pub struct TerrainReport {
     /// Altitudes of the interferers that the SIRs of the hops are computed with.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub interferers: Vec<InterfererHeight>,
-    /// Position error of the relays, m. Obstacles within it count as below the relay.
+    /// Position error of the relays, m. Obstacles within this distance count as below the relay.
     pub position_error_m: f64,
     /// SIR of the worst hop with the diffraction losses, linear. The plan's `sir` is without these losses.
     pub terrain_sir: f64,
     /// SIR of the worst hop with the diffraction losses, dB.
     pub terrain_sir_db: f64,
-    /// Terrain profiles of the hops, for pictures.
+    /// Terrain profiles of the hops, for drawing pictures.
     #[serde(skip)]
     pub profiles: Vec<Profile>,
 }
@@ -89,9 +90,9 @@ pub struct TerrainReport {
 pub struct FreeSpace<'a> {
     /// SIRs of the hops in the direction to Rx, linear.
     pub sirs: &'a [f64],
-    /// SIRs in the direction to Tx; empty if they are unknown.
+    /// SIRs in the direction to Tx; empty if the SIRs are unknown.
     pub sirs_back: &'a [f64],
-    /// Required SIR toward Tx as a fraction of the SIR toward Rx; 0 if only the direction to Rx counts.
+    /// Required SIR toward Tx as a fraction of the SIR toward Rx; 0 without traffic toward Tx.
     pub reverse: f64,
 }
 
@@ -222,7 +223,7 @@ impl TerrainReport {
         })
     }
 
-    /// Returns the name of a hop with its two ends. Hops are counted from 0.
+    /// Returns the name of the hop with index `hop` (from 0), with its two ends.
     fn name(&self, hop: usize) -> String {
         let node = |at: usize| match at {
             0 => "Tx".to_owned(),

@@ -13,17 +13,17 @@ use crate::report::TerrainReport;
 /// Limits on the positions of relays, m.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Largest error of a relay's position in every direction.
+    /// Largest error of a relay's position, the same in every direction.
     pub position_error_m: f64,
     /// Least and greatest height above the ground.
     pub above_ground_m: [f64; 2],
-    /// Least distance between the rooms of two neighbours.
+    /// Least distance along x between the rooms of two neighbours.
     pub apart_m: f64,
     /// Wavelength of the carrier.
     pub wavelength_m: f64,
 }
 
-/// Node of the chain: its interval of x, m, and its altitude above the datum, m.
+/// Node of the chain: the interval of x in which it may be, m, and its altitude above the datum, m.
 ///
 /// The datum is the straight line from the ground at Tx to the ground at Rx.
 #[derive(Clone, Copy, Debug)]
@@ -36,18 +36,18 @@ struct Stretch {
 ///
 /// Between two points the ground is no higher and no lower than at the points.
 struct Ridge {
-    /// Largest distance between two points.
+    /// Largest distance between two adjacent points.
     step_m: f64,
     /// Highest ground within the position error, plus the assumed error of the heights.
     highest: Vec<[f64; 2]>,
-    /// Lowest ground at most `off_m` beside the line Tx-Rx.
+    /// Lowest ground within `off_m` to the left and right of the line Tx-Rx.
     lowest: Vec<[f64; 2]>,
 }
 
 impl Ridge {
     /// Samples the ground, and returns the altitudes of Tx and Rx above the datum, m.
     ///
-    /// Relays are at most `off_m` beside the line Tx-Rx, with a position error of at most `error_m`.
+    /// Relays are at most `off_m` to the left or right of the line Tx-Rx, with a position error of at most `error_m`.
     fn new(ground: &Ground<'_>, [off_m, error_m]: [f64; 2]) -> Result<(Self, [f64; 2]), String> {
         let [tx, rx] = ground.ends;
         let datum = |x_m: f64| Ok::<_, String>(f64::from(ground.point(x_m, 0.0)?.amsl_mm) / 1e3);
@@ -99,7 +99,7 @@ impl Ridge {
 
     /// Returns true if every hop between the two intervals is clear: the ground is below its Fresnel zone.
     ///
-    /// `share` is the fraction of the zone's radius that counts.
+    /// `share` is the fraction of the zone's radius that must be free of ground.
     fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
         let ([a, b], [c, d]) = (from.x_m, to.x_m);
         Self::between(&self.highest, [a, d]).all(|[x, height]| {
@@ -125,8 +125,8 @@ fn steps(length_m: f64, step_m: f64) -> (f64, u32) {
 
 /// Returns the room of each relay: the x, m, at which its hops stay as clear as in `report`.
 ///
-/// This holds while all relays are in their rooms, within the position error. A relay in its room also keeps its limits
-/// of height above the ground. `None` for a relay without a room around its position.
+/// This holds while all relays are in their rooms, within the position error. A relay in its room also keeps within its
+/// limits of height above the ground. `None` for a relay without a room around its position.
 ///
 /// # Errors
 /// A text that names the position: the elevation files do not cover it, or have no height there.
@@ -164,7 +164,8 @@ pub fn rooms(
         ends.is_some_and(|(from, to)| ridge.is_free([*from, *to], share(hop), limits.wavelength_m))
     };
     let [least, most] = limits.above_ground_m;
-    // The least height is checked within the position error, the greatest height straight below the relay.
+    // The least height is checked over all ground within the position error, the greatest height only straight below
+    // the relay.
     let is_in_band = |node: &Stretch, strip: [f64; 2], inner: [f64; 2]| {
         let h = node.h_m + error;
         let mut highest = Ridge::between(&ridge.highest, strip);
@@ -185,7 +186,7 @@ pub fn rooms(
                     continue;
                 };
                 let mut next = now;
-                // One point beyond the edge, so that the ground at the edge is between two points.
+                // One point beyond the edge is included, so that the ground at the edge is between two points.
                 let (strip, inward_m) = if side == 0 {
                     next.x_m[0] -= ridge.step_m;
                     ([next.x_m[0] - ridge.step_m, now.x_m[0]], error)
@@ -213,7 +214,7 @@ pub fn rooms(
         }
     }
     let rooms = nodes.iter().skip(1).zip(is_in);
-    // The room is smaller than the interval by the position error.
+    // At each end, the room is smaller than the interval by the position error.
     Ok(rooms
         .map(|(node, is_in)| {
             let [from, to] = [node.x_m[0] + error, node.x_m[1] - error];

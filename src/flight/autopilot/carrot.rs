@@ -23,8 +23,8 @@ const END_PER_S: f32 = 0.5;
 /// Minimum speed of the moving target near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
-/// Assumed gain of an autopilot's position control, 1/s. A drone d metres behind its target flies faster than the
-/// target by 1.25 d m/s.
+/// Assumed gain of an autopilot's position control, 1/s. A drone that is d metres behind its target flies faster than
+/// the target by 1.25 d m/s.
 const CATCH_UP_PER_S: f32 = 1.25;
 
 /// Maximum speed of the moving target, as a fraction of the speed limit. The rest is a margin, because at times a drone
@@ -51,8 +51,8 @@ const TURN_PART: f32 = 2.0;
 /// to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
-/// Assumed time from a new setpoint until the drone reacts, ms. It includes 200 ms for the transmission to the flight
-/// controller, and 1000 ms for the delay of the drone's motion.
+/// Assumed time from a new setpoint until the drone reacts, ms. This time includes 200 ms for the transmission to the
+/// flight controller, and 1000 ms for the delay of the drone's motion.
 const BEHIND_MS: u64 = 1_200;
 
 /// Time in which the moving target's speed halves near the setpoint, ms: ln 2 / k with k = 0.5 /s.
@@ -185,8 +185,8 @@ impl Carrot {
         self.is_standing
     }
 
-    /// Returns the position of the moving target at the time `ago` before its last step. It is extrapolated with the
-    /// target's velocity.
+    /// Returns the position of the moving target at the time `ago` before its last step. The position is extrapolated
+    /// with the target's velocity.
     fn place_before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -334,7 +334,7 @@ const UNCONFIRMED: u8 = 10;
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// Number of times that this target has been sent while it stands still.
+    /// Number of transmissions of this target while it stands still.
     times_sent: u8,
     /// True once the autopilot has reported this target.
     is_accepted: bool,
@@ -342,7 +342,7 @@ pub(super) struct Target {
     since: Instant,
     /// Number of consecutive reports in which the autopilot's target is not the sent one.
     other_targets: u8,
-    /// Time of the autopilot's last report of another target, s.
+    /// Time of the autopilot's last report of a target other than the sent one, s.
     compared_s: u32,
     /// True once the autopilot has reported a target position in POSITION_TARGET_GLOBAL_INT.
     is_reported: bool,
@@ -370,8 +370,9 @@ impl Target {
         self.is_accepted = false;
     }
 
-    /// Compares the autopilot's reported target with the sent target. Returns true once when they count as different:
-    /// the target has been sent for [`SENT_FOR`], and [`REFUSED_AFTER`] reports in a row contained another target.
+    /// Compares the autopilot's reported target with the sent target. Returns true once when the two count as
+    /// different: the target has been sent for [`SENT_FOR`], and [`REFUSED_AFTER`] reports in a row contained a
+    /// different target.
     ///
     /// A larger difference is allowed for a moving target, because the report shows an earlier position of it.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
@@ -594,8 +595,8 @@ mod tests {
 
     /// Returns how many reports of a moving target in 20 s count as reports of a different target.
     ///
-    /// The autopilot reports twice a second. It reports the position that was sent `lag` times 100 ms earlier, moved
-    /// sideways by `aside_m`.
+    /// The autopilot reports twice a second. Each report has the position that was sent `lag` times 100 ms earlier,
+    /// moved sideways by `aside_m`.
     fn other_targets(lag: usize, aside_m: f32) -> usize {
         let axis = axis();
         let to = Placement::on_line(900.0, 20.0);
@@ -664,8 +665,8 @@ mod tests {
         );
     }
 
-    /// Checks that the moving target turns smoothly if a new setpoint is in another direction. The velocity in the old
-    /// direction ends within 3 s.
+    /// Checks that the moving target turns smoothly if a new setpoint lies in a different direction. The velocity in
+    /// the old direction ends within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

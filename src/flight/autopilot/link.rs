@@ -32,7 +32,8 @@ use crate::flight::mavlink::signing::Signing;
 /// MAVLink component number of this link: an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
-/// MAVLink system number of this component until the autopilot's number is known. It is the autopilots' default.
+/// MAVLink system number of this component until the autopilot's number is known. Autopilots use this number by
+/// default.
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
@@ -86,7 +87,7 @@ pub struct Autopilot {
     target: Option<Target>,
     /// Position at which the moving target stops after a withdrawal of the setpoint. `None` while there is a setpoint.
     stop: Option<Placement>,
-    /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never did.
+    /// Time at which the autopilot last stopped reporting the drone's position; `None` before the first stop.
     blind_at: Option<Instant>,
     /// Start of the time in which positions are received again in [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
@@ -198,7 +199,7 @@ impl Autopilot {
         }
     }
 
-    /// Processes an operator's command to this companion. Any sender whose frames are accepted can send it.
+    /// Processes an operator's command to this companion. Any sender whose frames the link accepts can send commands.
     fn handle_command(&mut self, received: &Received) {
         let Some(Incoming::CommandLong {
             command: CLEAR_LOST,
@@ -289,8 +290,8 @@ impl Autopilot {
         }
     }
 
-    /// Sets the position to fly to, from `Relay::setpoint`. The drone holds its position without a setpoint. It also
-    /// does so at a setpoint that is not finite or too far from the line Tx to Rx.
+    /// Sets the position to fly to, from `Relay::setpoint`. The drone holds its position if there is no setpoint, or if
+    /// the setpoint is not finite or too far from the line Tx to Rx.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
         let now = self.clock.advance(now);
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
@@ -360,7 +361,8 @@ impl Autopilot {
     /// Reports to the operator why the guard (collision avoidance) holds the relay back, for each side.
     ///
     /// A reason is sent while the relay controls the drone or in [`State::Standby`], once it has lasted for 3 s.
-    /// Shorter holds are normal while the relays agree on new positions. Equal lines are at least 10 s apart.
+    /// Shorter holds are normal while the relays agree on new positions. The time between two equal lines is at least
+    /// 10 s.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
         if self.newest_hold.0 != reasons {
@@ -383,7 +385,7 @@ impl Autopilot {
     }
 
     /// Queues a text of at most 50 bytes for the operator. Returns true if there was room. At most three texts can
-    /// wait. Equal texts are sent at least 10 s apart.
+    /// wait. The time between two equal texts is at least 10 s.
     pub fn send_text(&mut self, text: &str) -> bool {
         self.report.queue_text(text)
     }
@@ -683,8 +685,8 @@ impl Autopilot {
         self.target_frame(now, &target.carrot)
     }
 
-    /// Returns the frame that sends the moving target `carrot` to the autopilot. `None` if it is too far from the line
-    /// Tx to Rx.
+    /// Returns the frame that sends the moving target `carrot` to the autopilot. `None` if this target is too far from
+    /// the line Tx to Rx.
     fn target_frame(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
         let at: Geodetic = self.axis.point(carrot.place)?;
         let x_m = carrot.place.x_m;
@@ -707,7 +709,7 @@ impl Autopilot {
         message.encode(self.own(), self.peer(), sequence)
     }
 
-    /// Returns the MAVLink address of this component. It has the autopilot's system number, because this component is a
+    /// Returns the MAVLink address of this component. The system number is the autopilot's, because this component is a
     /// part of the vehicle.
     fn own(&self) -> Address {
         Address {
@@ -933,7 +935,7 @@ impl Autopilot {
         (is_news, position)
     }
 
-    /// Replaces this link's line from Tx to Rx by that of the relay's mission, if they differ.
+    /// Replaces this link's line from Tx to Rx by that of the relay's mission, if the two lines differ.
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();

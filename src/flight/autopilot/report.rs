@@ -190,7 +190,8 @@ impl Report {
         let _ = self.lines.push(line);
     }
 
-    /// Queues a text line of the firmware for the operator. Returns true if it was queued or is already waiting.
+    /// Queues a text line of the firmware for the operator. Returns true if the line was queued, or if it is already
+    /// waiting.
     pub(super) fn queue_text(&mut self, text: &str) -> bool {
         let mut line = String::new();
         for character in text.chars() {

@@ -19,7 +19,7 @@
 //! choose another mode first, and the operator is informed of this. Only the pilot's choice of a mode ends a PX4's
 //! failsafe. Nothing else changes a state: no setpoint, and no message of a neighbour.
 
-/// Control state of the drone. It shows whether the relay controls the drone, and determines which targets the
+/// Control state of the drone. The state shows whether the relay controls the drone, and determines which targets the
 /// autopilot gets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum State {
@@ -54,7 +54,7 @@ pub(super) struct Observed {
 }
 
 impl State {
-    /// Returns the next control state. It follows from this state and the observations `observed`.
+    /// Returns the next control state. The next state follows from this state and the observations `observed`.
     pub(super) const fn next(self, observed: Observed) -> Self {
         let Observed {
             is_received: there,
@@ -154,7 +154,7 @@ impl FlightMode {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum ReleaseCause {
-    /// Another mode was chosen, by the pilot or by a ground station.
+    /// The pilot or a ground station has chosen a different mode.
     Chosen,
     /// The autopilot entered its failsafe.
     Failsafe,
@@ -205,7 +205,8 @@ pub enum WaitReason {
     Failsafe,
     /// The autopilot's messages arrive late.
     Link,
-    /// The autopilot was in OFFBOARD or GUIDED before this link started. The pilot must first choose another mode.
+    /// The autopilot was in OFFBOARD or GUIDED before this link started. The pilot must first choose a different mode,
+    /// and then this mode again.
     Found,
     /// No mode change by the pilot has been received since this link started.
     Unseen,

@@ -17,7 +17,7 @@ const WINDOW: Duration = Duration::from_millis(4_000);
 /// Maximum time from a request for a message to its answer.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Number of [`WINDOW`]s without a message after which it is no longer requested.
+/// Number of [`WINDOW`]s without a requested message after which the requests for it end.
 ///
 /// A message without which the drone cannot fly is requested every [`SELDOM`] windows instead.
 const MAX_SILENT_WINDOWS: u8 = 4;
@@ -119,7 +119,7 @@ impl Streams {
         }
     }
 
-    /// Returns true if the autopilot answers requests, and false if it does not. `None` if unknown.
+    /// Returns whether the autopilot answers requests; `None` if unknown.
     pub(super) const fn answers_requests(&self) -> Option<bool> {
         if self.is_answered {
             Some(true)

@@ -18,8 +18,8 @@ const IN_A_ROW: u8 = 3;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Mistrust {
-    /// The autopilot signs, the link has no key, and the autopilot answers no request. It seems to ignore unsigned
-    /// frames.
+    /// The autopilot signs, the link has no key, and the autopilot answers no request. The autopilot seems to ignore
+    /// unsigned frames.
     NoKey,
     /// The autopilot signs and the link has no key, but the autopilot answers unsigned requests.
     SignsOnly,

@@ -22,7 +22,7 @@ pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
 /// Silence of the autopilot after which a PX4 is possibly in its failsafe.
 ///
-/// A PX4 enters it after a second without a target, and a target is sent every 0.2 s.
+/// A PX4 enters its failsafe after a second without a target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
 /// Assumed maximum time from the measurement of a position to the transmission of its message.
@@ -101,7 +101,8 @@ pub(super) struct Vehicle {
     chosen: bool,
     armed: bool,
     in_air: bool,
-    /// Start of the time in which the autopilot reports "on the ground". `None` if it does not.
+    /// Start of the time in which the autopilot reports "on the ground". `None` while the autopilot does not report
+    /// this.
     grounded_at: Option<Instant>,
     /// True while the drone is outside of the autopilot's geofence.
     pub(super) is_breached: bool,
@@ -256,7 +257,7 @@ impl Vehicle {
 
     /// Withdraws the right to control the drone if its mode has possibly changed without the pilot.
     ///
-    /// A PX4 in its failsafe resumes OFFBOARD once it receives targets. In OFFBOARD it enters its failsafe after a
+    /// A PX4 in its failsafe resumes OFFBOARD once it receives targets. In OFFBOARD a PX4 enters its failsafe after a
     /// second without a target. So a PX4 is sent targets only after it has reported a mode other than OFFBOARD outside
     /// of a failsafe. The report must be newer than the start of the link, the last failsafe, and the last time at
     /// which the link was interrupted or late.
@@ -325,8 +326,8 @@ impl Vehicle {
         self.home = None;
     }
 
-    /// Converts the stored position to another line from Tx to Rx by `moved`. If `moved` returns `None`, the position
-    /// is dropped.
+    /// Converts the stored position to a new line from Tx to Rx by the function `moved`. If `moved` returns `None`, the
+    /// position is dropped.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -530,7 +531,7 @@ const TAG: u32 = 0xA_52A5;
 /// autopilot that has replied once counts as late whenever it does not reply.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Tag in the low bits of every request. It shows which replies belong to this link.
+    /// Tag in the low bits of every request. The tag shows which replies belong to this link.
     tag: u32,
     due: Option<Instant>,
     /// Time of the first TIMESYNC request; `None` before it.
@@ -587,7 +588,7 @@ impl Echo {
 
     /// Returns the earliest time at which a message received now can have been sent; `None` if unknown.
     ///
-    /// It is the time of the last answered TIMESYNC request, because messages arrive in order.
+    /// This is the time of the last answered TIMESYNC request, because messages arrive in order.
     pub(super) const fn floor(&self) -> Option<Instant> {
         self.answered_at
     }
@@ -619,8 +620,8 @@ const HALF: Duration = Duration::from_millis(4_000);
 
 /// Minimum number of messages in each half of the time window for the minimum delay.
 ///
-/// Otherwise a half could contain only the late messages after a pause of the link. Their delay would then count as
-/// normal.
+/// Otherwise a half could contain only the late messages after a pause of the link. Then the delay of these late
+/// messages would count as normal.
 const LEAST: u8 = 8;
 
 /// Assumed maximum drift between the clocks of relay and autopilot, as a fraction of time: 2^-10. The value is the
@@ -653,8 +654,8 @@ struct Anchor {
 }
 
 impl RemoteClock {
-    /// Returns the time at which a message was created, on the relay's clock. It arrived at `now` and was created
-    /// `boot_ms` after the autopilot's start. `None` if the autopilot has restarted.
+    /// Returns the time at which a message was created, on the relay's clock. The message arrived at `now`, and was
+    /// created `boot_ms` after the autopilot's start. `None` if the autopilot has restarted.
     pub(super) fn creation_time(&mut self, now: Instant, boot_ms: u32) -> Option<Instant> {
         let boot_us = i64::from(boot_ms) * 1_000;
         let difference = now.as_micros().cast_signed().saturating_sub(boot_us);
@@ -892,8 +893,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20));
     }
 
-    /// Checks messages that a cable delivers all at once after 7 s. The age of the first message is 7 s. Each later
-    /// message has a smaller age, because it was sent later.
+    /// Checks messages that a cable delivers all at once after 7 s. The age of the first message is 7 s. Later messages
+    /// were sent later, so their ages are smaller.
     #[test]
     fn a_burst_after_a_gap_is_old() {
         let held = 20_000..27_000;

@@ -15,7 +15,7 @@ const SIGNING: usize = if MAVLINK_SIGNING { SIGNATURE } else { 0 };
 /// Length of the longest frame to send, bytes, with a signature.
 pub(crate) const FRAME: usize = HEADER + LONGEST + CHECKSUM + SIGNING;
 
-/// MAVLink frame to send. Its capacity includes a signature.
+/// MAVLink frame to send. The capacity includes a signature.
 pub type FrameBytes = Vec<u8, FRAME>;
 
 /// Severities of [`Outgoing::StatusText`] (`MAV_SEVERITY`).
@@ -215,7 +215,8 @@ impl Outgoing<'_> {
     }
 }
 
-/// Writer of a message's fields into a frame. It never overflows, since these fields are at most `LONGEST` bytes.
+/// Writer of a message's fields into a frame. The frame never overflows, since these fields are at most `LONGEST`
+/// bytes.
 struct Writer(FrameBytes);
 
 impl Writer {

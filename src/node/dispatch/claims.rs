@@ -89,8 +89,8 @@ impl Node {
 
     /// Returns the node to which a claim must be sent, and marks the claim as sent. `None` if no claim is due.
     ///
-    /// The two neighbours receive claims alternately. A relay without neighbours on a shared channel sends them to its
-    /// own number, so that another node with that number receives them.
+    /// The two neighbours receive claims alternately. On a shared channel, a relay without neighbours addresses its
+    /// claims to its own number, so that a second node with that number receives them.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;
@@ -133,7 +133,7 @@ impl Node {
         self.duplicate.rival(claim)
     }
 
-    /// Returns true while this relay is passive, because another node uses its node number.
+    /// Returns true while this relay is passive, because a second node uses the same node number.
     pub(crate) const fn is_passive(&self) -> bool {
         self.duplicate.is_passive()
     }
@@ -145,8 +145,8 @@ impl Node {
         }
     }
 
-    /// Makes this passive relay active again, as after a restart. It leaves its view, because the other node with its
-    /// number may have caused a view change.
+    /// Makes this passive relay active again, as after a restart. The relay leaves its view, because the other node
+    /// with its number may have caused a view change.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

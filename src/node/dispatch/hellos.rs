@@ -134,8 +134,8 @@ impl Node {
         fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this relay. These are this relay, and the relays
-    /// on the side `far`.
+    /// Returns the number of relays that a neighbour reaches through this relay. They are this relay itself, and all
+    /// relays on its side `far`.
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. A relay that the view leaves out still has its
         // count from the view before, although no neighbour selects it.
@@ -225,8 +225,8 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records whether node `from` receives this relay (`heard`). Reports the node to the firmware if it repeatedly
-    /// does not.
+    /// Records whether node `from` receives this relay (`heard`). After repeated failures the node is reported to the
+    /// firmware.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self

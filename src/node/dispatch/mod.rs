@@ -81,7 +81,8 @@ fn seed_of(identity: Identity, seed: u32) -> u32 {
 }
 
 impl Node {
-    /// Creates a relay with valid `identity` and `settings`. It does nothing until [`begin`](Self::begin) is called.
+    /// Creates a relay with valid `identity` and `settings`. The relay does nothing until [`begin`](Self::begin) is
+    /// called.
     ///
     /// The value has only plain numbers, so that the compiler can write it in place, without a copy on the stack.
     pub(crate) fn new(
@@ -343,8 +344,8 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Returns the state that a protocol layer receives as an argument. It borrows only `member`, so that the layers
-    /// can be borrowed mutably at the same time.
+    /// Returns the state that a protocol layer receives as an argument. The state borrows only `member`, so that the
+    /// layers can be borrowed mutably at the same time.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {
@@ -377,9 +378,9 @@ impl Layers {
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True if the end of the lease was reported to the firmware in this view. It is reported once per view.
+    /// True if the end of the lease was reported to the firmware in this view. One report is made per view.
     pub(super) lapse_reported: bool,
-    /// True if a missing quorum was reported to the firmware in this view. It is reported once per view.
+    /// True if a missing quorum was reported to the firmware in this view. One report is made per view.
     pub(super) no_quorum_reported: bool,
 }
 
@@ -392,7 +393,7 @@ const LATER_RETENTION: u32 = 4;
 /// Timer after which a relay without a quorum drops its links and searches for other neighbours.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NoQuorumTimer {
-    /// Expiry of the timer; `None` while there is a quorum.
+    /// Time at which the timer expires; `None` while there is a quorum.
     at: Option<Instant>,
     has_expired: bool,
 }
@@ -444,7 +445,7 @@ impl Node {
 }
 
 impl Node {
-    /// Returns the next message, with the side and the node to send it to. Call it until it returns `None`.
+    /// Returns the next message, its side and its destination node. Call this until the result is `None`.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         if self.member.settings.auth.is_none()
             && let Some(claim) = self.next_claim()

@@ -129,7 +129,7 @@ impl Node {
     }
 
     /// Stores `upload` if it is newer than the stored mission. If it contradicts the positions of Tx and Rx or the
-    /// geofence, it is refused, counted, and reported once.
+    /// geofence, the mission is refused, counted, and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
             Offered::Stored => self.on_stored(now),

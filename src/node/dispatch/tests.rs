@@ -322,7 +322,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
             let held = node.layers.update.latest();
             let withheld = offer(&mut node, upload(1));
             if hellos {
-                // The relay continues to send hellos. Their number has changed by then.
+                // The relay continues to send hellos. The number in the hellos has changed by then.
                 let step = Settings::default().dead_after;
                 node.layers
                     .update

@@ -25,7 +25,7 @@ use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum number of times that the hold-down of a flapping link doubles. A link flaps if it is lost repeatedly.
+/// Maximum number of doublings of the hold-down of a flapping link. A link flaps if it is lost repeatedly.
 const MAX_DOUBLINGS: u8 = 3;
 
 /// Maximum time for which a flapping link is not used (hold-down), in units of `dead_after`.
@@ -170,8 +170,8 @@ impl Damping {
     /// Records the loss of the link to the node `distance` relays away. If `counts` is false, because the channel loses
     /// many frames, only the loss of a flapping link counts.
     ///
-    /// If another link on this side flaps, the lost link takes over its number of losses. The reason is that all links
-    /// on one side cross the same gap in the chain.
+    /// If a different link on this side flaps, the lost link takes over the number of losses of that link. The reason
+    /// is that all links on one side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -276,8 +276,8 @@ impl Damping {
         self.candidate = None;
     }
 
-    /// Records a frame of a candidate `distance` relays away. Returns true if it has been received without gaps for at
-    /// least `probe_after` and at least `more`.
+    /// Records a frame of a candidate `distance` relays away. Returns true if this candidate has been received without
+    /// gaps for at least `probe_after` and at least `more`.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,

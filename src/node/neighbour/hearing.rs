@@ -5,7 +5,7 @@ use crate::time::{Duration, Instant};
 
 pub(crate) use crate::wire::CANDIDATES;
 
-/// Minimum interval between two reports to the firmware about the same refused node.
+/// Minimum interval between two reports to the firmware about one refused node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
 /// Number of consecutive events at each of the four nearest nodes. An event is, for example, a handshake that is signed
@@ -116,7 +116,8 @@ impl Refusals {
     }
 }
 
-/// Returns the bit of the node `distance` relays away in a bit mask. 0 if it is not one of the four nearest nodes.
+/// Returns the bit of the node `distance` relays away in a bit mask. The result is 0 for a node that is not one of the
+/// four nearest.
 pub(crate) const fn mask(distance: u16) -> u8 {
     if distance >= 1 && distance <= CANDIDATES {
         1 << (distance - 1)

@@ -44,8 +44,8 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
 
 /// Returns the interval between heartbeat requests before the first agreement on positions.
 ///
-/// It is longer than usual, because all these relays search on one channel. It is still short enough for three requests
-/// between `probe_after` and `dead_after`.
+/// The interval is longer than [`tick`], because many relays then search on one channel. It is short enough for three
+/// requests between `probe_after` and `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
@@ -102,7 +102,8 @@ pub(crate) struct Liveness {
     request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour was last known to be alive.
     unanswered: u16,
-    /// Longest recent run of unanswered heartbeat requests before a reply. It measures the losses of the channel.
+    /// Longest recent run of unanswered heartbeat requests before a reply. The number measures the losses of the
+    /// channel.
     ///
     /// It starts at [`MIN_REQUESTS`] and decays with each reply.
     longest: u16,
@@ -111,7 +112,7 @@ pub(crate) struct Liveness {
 /// Result of the check of a silent neighbour.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Silence {
-    /// True if this check has found the neighbour to be lost.
+    /// True if this check has found that the neighbour is lost.
     pub(crate) lost: bool,
     pub(crate) next_check: Instant,
 }
@@ -136,7 +137,7 @@ impl Liveness {
     }
 
     /// Restarts the record, because a different node is the neighbour now. The longest run of unanswered requests is
-    /// kept, because it describes the channel.
+    /// kept, because that number describes the channel.
     ///
     /// The unanswered requests to the previous node count as a run, unless `was_down` is true: then they measure an
     /// outage of the link. If `flaps` is true (the link flaps slowly), all runs are dropped.
@@ -184,7 +185,7 @@ impl Liveness {
         self.was_received = true;
     }
 
-    /// Records that the neighbour was alive at time `at`. Returns true if it counted as lost before.
+    /// Records that the neighbour was alive at time `at`. Returns true if the neighbour counted as lost before.
     pub(crate) fn record_sign_of_life(&mut self, at: Instant) -> bool {
         self.last_sign = self.last_sign.max(at);
         self.was_received = true;
@@ -206,7 +207,7 @@ impl Liveness {
         self.request_number
     }
 
-    /// Returns the time at which the heartbeat request `number` was sent. `None` unless it is one of the last four.
+    /// Returns the time at which the heartbeat request `number` was sent. `None` for all but the last four requests.
     pub(crate) fn requested_at(&self, number: u16) -> Option<Instant> {
         if number == 0 || self.request_number == 0 {
             return None;

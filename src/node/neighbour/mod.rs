@@ -26,14 +26,14 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// State of both sides before the relay starts.
+    /// State of both sides of the relay (toward Tx and toward Rx) before its start.
     pub(crate) const NONE: Self = Self {
         upstream: Neighbour::NONE,
         downstream: Neighbour::NONE,
     };
 
-    /// Starts both sides of relay `node` at `now`. Its first neighbours are the relays with the adjacent node numbers,
-    /// in a chain of `all` relays.
+    /// Starts both sides of relay `node` at `now`. The relay's first neighbours are the relays with the adjacent node
+    /// numbers, in a chain of `all` relays.
     pub(crate) fn begin(
         &mut self,
         node: u16,

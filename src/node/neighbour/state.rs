@@ -47,7 +47,7 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// The node has selected this relay, too, according to its last report.
+    /// This relay and the node have selected each other, according to the node's last report.
     Linked,
     /// This relay has selected the node, but the node has not selected this relay, or no longer does.
     Pairing {
@@ -200,7 +200,7 @@ impl Neighbour {
         self.liveness.is_silent()
     }
 
-    /// Records that the neighbour was alive at time `at`. Returns true if it counted as lost before.
+    /// Records that the neighbour was alive at time `at`. Returns true if the neighbour counted as lost before.
     pub(crate) fn record_sign_of_life(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.record_sign_of_life(at);
         if self.is_mutual() {
@@ -220,7 +220,7 @@ impl Neighbour {
         self.state == NeighbourState::Linked
     }
 
-    /// Records whether the neighbour has selected this relay (`mutual`). Returns true if this is a change.
+    /// Records whether the neighbour has selected this relay (`mutual`). Returns true if the selection has changed.
     pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -341,8 +341,8 @@ impl Neighbour {
 
     /// Returns the silence of a node after which the link to it counts as lost.
     ///
-    /// It is usually `dead_after`. A side that receives no node sends hellos only every `dead_after`, and a few lost
-    /// frames then cause a silence several times as long. For such a side the result is the maximum duration of a
+    /// The usual result is `dead_after`. A side that receives no node sends hellos only every `dead_after`, and a few
+    /// lost frames then cause a silence several times as long. For such a side the result is the maximum duration of a
     /// lease.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
         if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
@@ -416,8 +416,8 @@ impl Neighbour {
         }
     }
 
-    /// Selects `candidate` if this side has no neighbour, or if the candidate is better. Returns true if it was
-    /// selected. A node is better if it is nearer, or if more relays can be reached through it.
+    /// Selects `candidate` if this side has no neighbour, or if the candidate is better. Returns true if the candidate
+    /// was selected. It is better if it is nearer, or if more relays can be reached through it.
     ///
     /// The candidate has sent a hello, receives this relay, and has selected this relay, no node, or a node farther
     /// away.
@@ -492,7 +492,7 @@ pub(crate) struct Candidate {
     pub(crate) node: u16,
     /// Distance of the candidate, in relays; 1 for the next node number.
     pub(crate) distance: u16,
-    /// True if the candidate is toward Rx, false if it is toward Tx.
+    /// True for a candidate toward Rx, false for one toward Tx.
     pub(crate) downstream: bool,
     /// True if the candidate has selected this relay as its neighbour.
     pub(crate) pairs: bool,
@@ -533,13 +533,13 @@ impl Neighbour {
         self.node == self.agreed.node()
     }
 
-    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. This relay proposes
-    /// only if it has no neighbour toward the leader.
+    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. This relay makes
+    /// proposals only without a neighbour toward the leader.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// Records that a view proposal was granted. Its sender becomes this side's neighbour in the view.
+    /// Records that a view proposal was granted. The sender of the proposal becomes this side's neighbour in the view.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
@@ -568,7 +568,7 @@ pub(super) struct AgreedNodes {
     in_view: u16,
     /// Neighbour at the last decision on a view, granted or refused.
     counted: u16,
-    /// Node that sent the last view proposal; 0 if this relay made it.
+    /// Node that sent the last view proposal; 0 if this relay made the proposal itself.
     proposer: u16,
 }
 
@@ -596,7 +596,7 @@ impl AgreedNodes {
         };
     }
 
-    /// Records that a view proposal was granted. Its sender is the neighbour on this side.
+    /// Records that a view proposal was granted. The sender of the proposal is this side's neighbour in the view.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
@@ -636,8 +636,8 @@ const NOT_RECEIVED: u8 = 8;
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Returns true if this relay and the node `distance` relays away receive each other. A link that is held down
-    /// because it flaps does not count.
+    /// Returns true if this relay and the node `distance` relays away receive each other. A flapping link that is held
+    /// down does not count.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held_down_nodes(now, settings);
         let is_in = |nodes: u8| mask(distance) & nodes != 0;
@@ -704,8 +704,8 @@ impl Neighbour {
         }
     }
 
-    /// Returns a bit mask of the recently received nodes; bit 0 is the nearest node. Nodes with links that are held
-    /// down because they flap are left out.
+    /// Returns a bit mask of the recently received nodes; bit 0 is the nearest node. Nodes with flapping links that are
+    /// held down are left out.
     pub(crate) fn received_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         let held = self.damping.held_down_nodes(now, settings);
         self.hearing.recent(now, settings) & !held
@@ -757,7 +757,7 @@ impl Neighbour {
     }
 
     /// Returns the time at which the heartbeat request `number` was sent. Called when its reply arrives. `None` if the
-    /// request is too old.
+    /// request is not among the last few.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }

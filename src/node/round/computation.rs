@@ -71,13 +71,13 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True from the start of a pass along the chain until it is counted in the statistics.
+    /// True from the start of a pass along the chain until the statistics have counted this pass.
     pub(super) began: bool,
     /// Altitude and transmit power of this relay in the mission.
     pub(super) profile: Profile,
     /// Altitudes and powers of the relays of this view, as collected along the chain.
     pub(super) seats: Seats,
-    /// Position computed for this relay by the joint method; `None` until it is computed.
+    /// Position computed for this relay by the joint method; `None` before the computation.
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
@@ -416,7 +416,7 @@ impl Rounds {
     }
 
     /// Records the result of a pass of the token. Returns true if it was the last pass. `any` is true if any relay has
-    /// moved in it. `sir` is the SIR of the chain's worst hop, linear.
+    /// moved in this pass. `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -546,8 +546,7 @@ impl SweepPass {
         self.done
     }
 
-    /// Accepts the result of a sweep if this relay has a position for the committed target. Returns true if it was
-    /// accepted.
+    /// Accepts the result of a sweep if this relay has a position for the committed target. Returns true on acceptance.
     pub(crate) fn apply_sweep_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
@@ -600,8 +599,8 @@ impl SweepPass {
         }
     }
 
-    /// Returns the committed target SIR, and the farthest x at which this relay meets it, m. `None` if no target is
-    /// committed.
+    /// Returns the committed target SIR, and the farthest x at which this relay meets this target, m. `None` if no
+    /// target is committed.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((

@@ -29,8 +29,8 @@ impl Computation {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Returns true if the leader must collect profiles (altitude and power) next. This is so if a relay's profile
-    /// differs from the common one, and not all profiles are known.
+    /// Returns true if the leader must collect profiles (altitude and power) next. This is necessary if a relay's
+    /// profile differs from the common one, and not all profiles are known.
     pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();

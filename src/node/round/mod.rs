@@ -205,7 +205,7 @@ impl Round {
         }
     }
 
-    /// Handles a measurement of this relay's radio; returns true if it was accepted.
+    /// Handles a measurement of this relay's radio; returns true if the measurement was accepted.
     pub(crate) fn handle_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         if sample.is_heard() {
             return SENSING
@@ -247,7 +247,7 @@ impl Round {
         }
     }
 
-    /// Loads another mission with the profile `profile` of this relay. The agreed position is kept.
+    /// Loads a new mission, with `profile` as this relay's profile. The agreed position is kept.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.computation.load(profile);
     }
@@ -316,8 +316,8 @@ impl Round {
         self.computation.is_untouched()
     }
 
-    /// Returns the position that the chain has agreed on; `None` before an agreement. The setpoint can be another
-    /// position, because the guard (collision avoidance) limits it.
+    /// Returns the position that the chain has agreed on; `None` before an agreement. The setpoint can differ from this
+    /// position, because the guard (collision avoidance) limits the setpoint.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
     }

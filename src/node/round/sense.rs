@@ -200,8 +200,8 @@ impl Computation {
         Action::Work
     }
 
-    /// Continues the leader's search for a faulty sensor with the collected measurements. Returns true if it needs
-    /// another collection. The estimate then stays unchanged.
+    /// Continues the leader's search for a faulty sensor with the collected measurements. Returns true if the search
+    /// needs one more collection. In this case the estimate stays unchanged.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -219,8 +219,8 @@ impl Computation {
         next == Next::Again
     }
 
-    /// Computes a new interference estimate from the collected measurements. Returns true if it has changed and must be
-    /// distributed.
+    /// Computes a new interference estimate from the collected measurements. Returns true if the estimate has changed
+    /// and must be distributed.
     fn review_estimate(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {

@@ -19,8 +19,8 @@ use std::vec::Vec;
 
 const RELAYS: u16 = 3;
 
-/// Chain of three relays for the tests, with one target SIR per sweep. Its clock advances by 1 ms with each call of a
-/// relay's method.
+/// Chain of three relays for the tests, with one target SIR per sweep. The chain's clock advances by 1 ms with each
+/// call of a relay's method.
 struct Line {
     members: [Member; RELAYS as usize],
     rounds: [Round; RELAYS as usize],
@@ -175,8 +175,8 @@ fn an_answer_counts_from_when_what_it_answers_was_said_and_nothing_that_comes_ag
         }
         let on = line.onward(1);
         line.hear(2, &on);
-        // After a retransmission a reply counts from the first transmission, because it does not show which one it
-        // answers.
+        // After a retransmission a reply counts from the first transmission, because the reply does not show which
+        // transmission it answers.
         line.step(1, |round, _| round.resend());
         line.onward(1);
         let verdict = line.back(2);

@@ -31,7 +31,7 @@ use crate::wire::message::{Decision, Message, Poll, Proposal};
 /// Maximum increase of the latest known view number by one message. So no single message can use up all numbers.
 const MAX_ADVANCE: u32 = 4096;
 
-/// State of one relay in view changes, by which the relays agree on the members of the chain.
+/// State of one relay in a view change: the relays' agreement on the members of the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
     /// Progress of the view proposal along the chain. Its stage is `Outstanding` while the decision is awaited.
@@ -74,7 +74,8 @@ impl ViewChange {
     /// Restores the stored votes on views after a start, and requests a view. `untouched` is true if the agreement on
     /// positions has not started.
     ///
-    /// Returns an error if this relay has already started, or has loaded another mission.
+    /// Returns an error if this relay has already started, or had loaded a different mission when the votes were
+    /// stored.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -102,7 +103,7 @@ impl ViewChange {
         self.newest
     }
 
-    /// Records that another relay knows `view`. The latest known view number advances by at most [`MAX_ADVANCE`],
+    /// Records that some other relay knows `view`. The latest known view number advances by at most [`MAX_ADVANCE`],
     /// because one message could otherwise use up all numbers. A relay that was away for long receives `view`
     /// repeatedly, and so catches up.
     #[inline(never)] // called from many places
@@ -142,7 +143,7 @@ impl ViewChange {
         self.refused
     }
 
-    /// Requests a view later than `proposal`, whose decision can no longer arrive.
+    /// Requests a view later than `proposal`, because the decision on `proposal` can no longer arrive.
     pub(super) fn request_later_view(&mut self, context: &Context<'_>, proposal: ViewId) {
         if self.newest <= proposal
             && let Some(later) = proposal.next_by(context.member.node)
@@ -293,7 +294,7 @@ impl ViewChange {
         self.apply_view_verdict(context, verdict)
     }
 
-    /// Schedules another view proposal after a refusal, because more relays may be reachable by then.
+    /// Schedules a new view proposal after a refusal, because more relays may be reachable by then.
     pub(super) fn retry_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
         self.request.request_after_refusal(context.now, wait);
@@ -339,7 +340,7 @@ impl ViewChange {
         }
         let proposal = proposed.view;
         if !self.electorate.accept(proposal, base, accepted) {
-            // Another node that uses the proposer's index has made this proposal with the same identifier.
+            // A second node that uses the proposer's index has made this proposal with the same identifier.
             self.request_later_view(context, proposal);
             return Effects::STALE;
         }
@@ -423,8 +424,8 @@ impl ViewChange {
         })
     }
 
-    /// Handles the next relay's reply that message `number` is in progress. Returns true if it is the outstanding view
-    /// proposal.
+    /// Handles the next relay's reply that message `number` is in progress. Returns true if that message is the
+    /// outstanding view proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .outstanding()
@@ -439,7 +440,7 @@ impl ViewChange {
 
 impl ViewChange {
     /// Handles the timers of retransmissions and view requests. `leads` is true if this relay has no neighbour toward
-    /// the leader. `fresh` is true if it has not taken part in any agreement or view since its start.
+    /// the leader. `fresh` is true if this relay has not taken part in any agreement or view since its start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,

@@ -80,7 +80,7 @@ impl Electorate {
         }
     }
 
-    /// Returns the latest view proposal that this relay has promised. It accepts no earlier proposal (Paxos).
+    /// Returns the latest view proposal that this relay has promised. This relay accepts no earlier proposal (Paxos).
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
     }
@@ -210,7 +210,7 @@ impl Electorate {
         }
     }
 
-    /// Returns true if this relay has accepted `view`, but does not know yet that it is agreed on.
+    /// Returns true if this relay has accepted `view`, but does not know yet that the view is agreed on.
     pub(crate) fn awaits(&self, view: ViewId) -> bool {
         self.accepted
             .is_some_and(|accepted| accepted.view.id == view)

@@ -590,7 +590,7 @@ impl Check {
 }
 
 impl Check {
-    /// Returns true if the agreed views form one sequence. Each agreed view must replace the initial view or another
+    /// Returns true if the agreed views form one sequence. Each agreed view must replace the initial view or an earlier
     /// agreed view, and no two may replace the same view.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {

@@ -10,7 +10,7 @@ const FORMAT: u32 = 1;
 
 /// Votes on views, which must survive a reboot in flight.
 ///
-/// Without them a restarted relay could vote twice, and two parts of a chain could each decide on a view.
+/// Without stored votes a restarted relay could vote twice, and two parts of a chain could each decide on a view.
 ///
 /// | event | action of the firmware |
 /// | --- | --- |
@@ -24,7 +24,7 @@ const FORMAT: u32 = 1;
 pub struct ViewRecord {
     /// Digest of the mission that was loaded before flight.
     base: u16,
-    /// Votes on views. Their `initial_leader` is 0, because it is not stored.
+    /// Votes on views. The field `initial_leader` is 0, because it is not stored.
     electorate: Electorate,
 }
 
@@ -43,8 +43,8 @@ error_texts!(RecordError {
     Begun => "the record of votes must be restored before the relay starts",
 });
 
-/// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash that an
-/// iterator over all bytes would need.
+/// Writer of numbers of one, two or four bytes, least significant byte first. This writer needs a third of the flash
+/// that an iterator over all bytes would need.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -331,8 +331,8 @@ mod tests {
         assert_eq!(first.unpersisted(), None);
     }
 
-    /// Checks that a relay sends nothing before its record is stored. It is relay 2 of 3 on a shared channel, with
-    /// silent neighbours.
+    /// Checks that a relay sends nothing before its record is stored. The tested relay is number 2 of 3 on a shared
+    /// channel, with silent neighbours.
     #[test]
     fn nothing_is_sent_before_the_record_is_stored() {
         let settings = Settings {

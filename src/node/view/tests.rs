@@ -17,8 +17,8 @@ pub(super) fn id(number: u32, node: u32) -> ViewId {
     ViewId::from_bits(number << 10 | node)
 }
 
-/// Relay under test, in a chain of four. It has stored a mission of version 4, but flies the mission loaded before
-/// flight.
+/// Relay under test, in a chain of four. The relay has stored a mission of version 4, but flies the mission loaded
+/// before flight.
 pub(super) struct Relay {
     pub(super) member: Member,
     pub(super) latest: MissionId,

@@ -22,8 +22,8 @@ use crate::votes::Votes;
 /// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// Storage for the relay and the interference points of its mission. It is a `static`, because the stack is too
-/// small.
+/// Storage for the relay and the interference points of its mission. This storage is a `static`, because the stack is
+/// too small.
 #[derive(Debug)]
 pub struct DroneStorage {
     field: config::FieldStorage,

@@ -113,7 +113,7 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
 
 /// Runs the relay of `board` on a UART to each neighbour, and on a UART to the autopilot, if any.
 ///
-/// If the drone joins the chain, this never completes. It calls `feed` every [`TURN`] while the relay makes progress.
+/// If the drone joins the chain, this never completes. While the relay makes progress, `feed` is called every [`TURN`].
 ///
 /// # Errors
 /// The reason why the drone does not join the chain. It is also logged.

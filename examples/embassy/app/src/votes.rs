@@ -12,7 +12,7 @@ use crate::log;
 #[derive(Debug)]
 pub(crate) struct Votes<F> {
     flash: Nor<F>,
-    /// CRC of the configuration block. Votes stored under another block are ignored.
+    /// CRC of the configuration block. Votes that were stored with a different block are ignored.
     block: u32,
     view: Views,
 }

@@ -1,4 +1,4 @@
-//! Tests of live input: each frame is printed at once, also amid noise, and if the reader closes the pipe.
+//! Tests of live input: each frame is printed at once, also amid noise, and when the pipe closes.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::Stdio;

@@ -77,7 +77,7 @@ pub(crate) struct Wanted<'f> {
     value: Value<'f>,
 }
 
-/// Returns the fields that Wireshark should show for a message, in order. Their names begin with `prefix`.
+/// Returns the fields that Wireshark should show for a message, in order. The fields' names begin with `prefix`.
 ///
 /// The count of a list is a field as well, and so is each flag of a flags byte.
 pub(crate) fn flat<'f>(prefix: &str, fields: &Fields<'f>) -> Vec<Wanted<'f>> {

@@ -13,8 +13,8 @@ const PATIENCE: usize = 40_000;
 impl Chain {
     /// Runs the chain without faults until all relays agree in one view (membership of the chain).
     ///
-    /// Panics if that takes more than [`PATIENCE`] rounds. Returns at once if the leader finds that no target SIR can
-    /// be met. Does nothing if a relay lowers the target in fixed steps, which takes too long.
+    /// Panics if the agreement takes more than [`PATIENCE`] rounds. Returns at once if the leader finds that no target
+    /// SIR can be met. Does nothing if a relay lowers the target in fixed steps, which takes too long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {

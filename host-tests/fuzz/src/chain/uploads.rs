@@ -38,7 +38,7 @@ impl Chain {
         let Ok(upload) = Upload::new(&self.mission, self.version, config) else {
             return;
         };
-        // One mission in four has Tx and Rx positions, if they fit its distance.
+        // One mission in four has Tx and Rx positions, if the distance between these positions is right.
         let sited = SITES.filter(|_| moved.x_m.to_bits() % 4 == 3);
         let upload = sited
             .and_then(|sites| upload.with_sites(sites).ok())

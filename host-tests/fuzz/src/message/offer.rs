@@ -10,7 +10,7 @@ const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 /// Path-loss factors of the paper, with and without line of sight.
 const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
 
-/// Tx and Rx: latitude, longitude (1e-7 degrees), height (mm), exactly 1000 m apart.
+/// Tx and Rx: latitude, longitude (1e-7 degrees), height (mm), with a distance of exactly 1000 m.
 const SITES: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -58,8 +58,8 @@ impl Body<'_, '_> {
 
     /// Appends Tx and Rx positions, chosen by `choice`.
     ///
-    /// In most cases all numbers are 0, which means no positions. Otherwise the positions are 1000 m apart as in the
-    /// paper, or arbitrary.
+    /// In most cases all numbers are 0, which means no positions. Otherwise the positions are arbitrary, or their
+    /// distance is 1000 m as in the paper.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],

@@ -2,7 +2,7 @@
 
 use uav_relay::wire::message::Message;
 
-/// Returns the pass number of a message; `None` if it has none, such as a lease message.
+/// Returns the pass number of a message; `None` for a message without one, such as a lease message.
 ///
 /// A pass is a message along the chain and back.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {

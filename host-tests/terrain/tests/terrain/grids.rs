@@ -22,7 +22,7 @@ fn heights_are_interpolated_within_and_between_files() {
     let folder = folder();
     let file = |name: &str| folder.path().join(name);
     let cell = 1.0 / 3600.0;
-    // Two tiles side by side, one cell apart. The second has tie points at corners of cells.
+    // The two tiles are side by side, at a distance of one cell. In the second, tie points are corners of cells.
     Raster::geographic(8.0, 47.1, cell, [360, 361]).write(&file("west.tif"), plane);
     let east = Raster {
         is_point: false,
@@ -49,7 +49,7 @@ fn heights_are_interpolated_within_and_between_files() {
             "{lat} {lon}: {height}"
         );
     }
-    // Corners of the grid, and points between the two tiles.
+    // Tested are corners of the grid, and points between the two tiles.
     for (lat, lon) in [
         (47.0, 8.0),
         (47.1, 8.0),
@@ -126,7 +126,7 @@ fn utm_grids_have_the_heights_of_an_independent_projection() {
             let [e, n] = utm(lat, lon, zone.into());
             let expected = height(e, if south { n + 1e7 } else { n });
             let found = terrain.height_m(lat, lon).unwrap();
-            // On this plane a millimetre of height is a centimetre of distance.
+            // On this plane a millimetre of height corresponds to a centimetre of distance.
             assert!(
                 (found - expected).abs() < 2e-3,
                 "{epsg} {lat} {lon}: {found} {expected}"
@@ -194,7 +194,7 @@ fn unusable_files_and_places_are_named() {
         }
         .write(&file(name), plane);
     }
-    // Heights above Normaal Amsterdams Peil, in metres.
+    // The code is for heights above Normaal Amsterdams Peil, in metres.
     Raster {
         vertical: Some(5709),
         ..geographic()
@@ -281,7 +281,7 @@ fn unusable_files_and_places_are_named() {
     }
 }
 
-/// Checks that overlapping files whose heights differ too much are refused, in either order.
+/// Checks that overlapping files whose heights differ too much are refused, whichever is named first.
 #[test]
 fn files_that_contradict_each_other_are_named_with_the_place_and_both_heights() {
     let folder = folder();
@@ -323,7 +323,7 @@ fn files_that_contradict_each_other_are_named_with_the_place_and_both_heights() 
             assert!(line.contains(&part), "{line}: {part}");
         }
     }
-    // A hole is not compared with the other file.
+    // A hole (unknown height) is not compared with the second file.
     Raster {
         nodata: Some(-9999.0),
         ..east()
@@ -363,7 +363,7 @@ fn holes_and_uncovered_places_are_named() {
     let line = holed.height_m(47.05, 8.0600001).unwrap_err();
     assert!(line.contains("hole.tif: has no height at latitude 47.050000, longitude 8.060000: its value there is -9999"), "{line}");
     assert!(holed.height_m(47.05, 8.04).is_ok());
-    // A second file fills the hole.
+    // A second file has a height at the hole of the first.
     let filled = Terrain::load(&[file("hole.tif"), file("a.tif")]).unwrap();
     assert!((filled.height_m(47.05, 8.06).unwrap() - plane(8.06, 47.05)).abs() < 0.01);
     let line = filled.height_m(47.2, 8.05).unwrap_err();
@@ -412,7 +412,7 @@ fn geographic(east: f64, north: f64) -> [f64; 2] {
     [lat, lon]
 }
 
-/// Reads a real elevation model, if there is one. Its file has no coordinate system, so the test adds it.
+/// Reads a real elevation model, if there is one. The model's file has no coordinate system, so the test adds one.
 #[test]
 fn a_real_elevation_model_is_read() {
     let Some(original) = zurich() else {
@@ -425,7 +425,7 @@ fn a_real_elevation_model_is_read() {
     let line = Terrain::load(&[&file]).err().unwrap();
     assert!(line.contains("zurich.tif: "), "{line}");
     println!("without a coordinate system: {line}");
-    // A new directory at the end of the file: UTM zone 32, tie points at corners of cells.
+    // The test appends a new directory to the file: UTM zone 32, tie points at corners of cells.
     let keys: [u16; 12] = [1, 1, 0, 2, 1025, 0, 1, 1, 3072, 0, 1, 32632];
     let mut bytes = original.clone();
     let u32_at = |at: usize| u32::from_le_bytes(original[at..at + 4].try_into().unwrap());

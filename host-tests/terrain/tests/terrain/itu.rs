@@ -12,7 +12,7 @@ use crate::{rng, seeds};
 
 const LENGTHS_KM: [f64; 4] = [83.07993853, 132.315397, 17.39688966, 40.51112702];
 
-/// Antenna heights above the ground, m, and frequency, MHz, of the five links over each profile.
+/// Two antenna heights above the ground, m, and frequency, MHz, of the five links over each profile.
 const LINKS: [[f64; 3]; 5] = [
     [30.0, 30.0, 1000.0],
     [50.0, 10.0, 2500.0],
@@ -171,7 +171,7 @@ fn random_profiles_have_the_loss_of_the_second_implementation() {
         assert!((own - total).abs() < 0.01, "seed {seed}: {own} {total}");
         worst = worst.max((own - total).abs());
         kinds[usize::from(total > 0.0) + usize::from(spherical > smooth)] += 1;
-        // The same loss in the other direction.
+        // The loss must be the same in the opposite direction.
         let length = points[points.len() - 1][0];
         let back: Vec<[f64; 2]> = points.iter().rev().map(|[d, h]| [length - d, *h]).collect();
         let back = loss_db(&back, [path.hrs, path.hts], wavelength);
@@ -200,7 +200,7 @@ fn a_single_edge_at_the_line_of_sight_costs_six_decibels_and_more_with_height() 
         before = loss;
     }
     assert!(before > 20.0);
-    // Degenerate hops have no loss, and no NaN.
+    // Degenerate hops must have a loss of 0, not NaN.
     for (points, ends) in [
         (vec![[0.0, 5.0]], [6.0, 6.0]),
         (vec![[0.0, 5.0], [0.0, 5.0]], [6.0, 6.0]),

@@ -9,13 +9,13 @@ use std::f64::consts::PI;
 pub(crate) struct Path {
     /// Distances of the profile's points, km, from 0.
     pub(crate) d: Vec<f64>,
-    /// Heights of the profile's points, m above the sea.
+    /// Heights of the profile's points above the sea, m.
     pub(crate) h: Vec<f64>,
     pub(crate) hts: f64,
     pub(crate) hrs: f64,
     pub(crate) f_ghz: f64,
     pub(crate) vertical: bool,
-    /// Speed of light, m/s: the ITU's examples use 3e8.
+    /// Speed of light, m/s. The ITU's examples use 3e8.
     pub(crate) light: f64,
 }
 
@@ -68,7 +68,8 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
         light,
         ..
     } = *path;
-    // The Recommendations round these factors to 21.88, 0.9575, 0.036 and 18: 0.1 dB at losses above 100 dB.
+    // The Recommendations round these factors to 21.88, 0.9575, 0.036 and 18, which changes losses above 100 dB by 0.1
+    // dB.
     let per_km = PI * 1e12 / light;
     let to_x = per_km.powf(1.0 / 3.0);
     let to_y = 2.0 * (per_km * per_km / 1e9).powf(1.0 / 3.0);
@@ -102,8 +103,8 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
 
 /// Returns the diffraction loss of the smooth earth, dB.
 ///
-/// A bisection finds the point at which the line of sight is closest to the earth. Both antennas have the same
-/// elevation angle there, as in a reflection.
+/// A bisection finds the point at which the line of sight is closest to the earth. Seen from that point, both antennas
+/// have the same elevation angle, as in a reflection.
 fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {
     let horizon = (2.0 * AE_KM / 1000.0).sqrt() * (h1.sqrt() + h2.sqrt());
     if d_km >= horizon {

@@ -1,4 +1,4 @@
-//! Narrow peaks of a single grid point: no profile, circle or room may miss one.
+//! Narrow peaks of a single grid point: no profile, circle or room may miss such a peak.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -34,7 +34,7 @@ struct Peaks {
 }
 
 impl Peaks {
-    /// Draws random peaks near a line. They are in two files side by side.
+    /// Draws random peaks near a line. The elevation files are two, side by side.
     fn new(rng: &mut impl rand::Rng, ends: [[f64; 2]; 2], is_utm: bool) -> Self {
         let at = ends.map(|[lat, lon]| {
             if is_utm {
@@ -144,7 +144,7 @@ struct Scene {
 fn scene(folder: &std::path::Path, seed: u64) -> Scene {
     let rng = &mut rng(seed);
     let (lat, lon) = (rng.random_range(46.5..47.5), rng.random_range(8.2..9.8));
-    // Every sixth line is almost parallel to a row, and every sixth to a column.
+    // One line in six is almost parallel to a row, and one in six to a column.
     let reach = |rng: &mut chacha20::ChaCha8Rng, narrow: bool| {
         let far = if narrow { 0.0002 } else { 0.02 };
         rng.random_range(-far..far)
@@ -202,7 +202,7 @@ fn profiles_have_the_highest_ground_and_blocked_hops_are_named() {
             rng.random_range(503.0..520.0),
         );
         let profile = ground.profile([node(from, h0), node(to, h1)]).unwrap();
-        // Independent check: the surface at every 400th of a cell along the geodesic.
+        // As an independent check, the surface is sampled at every 400th of a cell along the geodesic.
         let (_, azimuth, _, _): (f64, f64, f64, f64) =
             earth.inverse(ends[0][0], ends[0][1], ends[1][0], ends[1][1]);
         let cell_m = if peaks.is_utm { 10.0 } else { 21.0 };
@@ -228,7 +228,7 @@ fn profiles_have_the_highest_ground_and_blocked_hops_are_named() {
             let bulge = along * (to - from - along) / (2.0 * EARTH_M);
             [height, -(sight - height - bulge)]
         };
-        // The largest of each, searched again around it in steps a hundred times as fine.
+        // The largest value of each kind is searched again around its point, in steps a hundred times as fine.
         let [highest, above_m] = [0, 1].map(|of: usize| {
             let largest = |from: f64, apart: f64, count: u32| {
                 let all = (0..=count).map(|step| from + apart * f64::from(step));
@@ -298,7 +298,7 @@ fn the_highest_ground_near_a_relay_is_that_of_the_surface() {
             let point = ground.point(x, y).unwrap();
             peaks.height_m([f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7])
         };
-        // Position beside a peak.
+        // This is a position beside a peak.
         let node = (0..500).map(|_| Node {
             x_m: rng.random_range(0.05..0.95) * axis.distance_m(),
             y_m: rng.random_range(-20.0..20.0),
@@ -318,7 +318,7 @@ fn the_highest_ground_near_a_relay_is_that_of_the_surface() {
             }
         }
         peaks_near += u32::from(highest > PLAIN_M + 1.0);
-        // The samples of the check are up to 1.5 m apart.
+        // The distance between samples of the check is up to 1.5 m.
         let steep = if peaks.is_utm { 2.5 } else { 1.2 };
         let apart = 0.5 * radius / 30.0 + radius * 0.00873;
         assert!(found > highest - 0.02, "seed {seed}: {found} {highest}");
@@ -350,7 +350,7 @@ fn no_hop_between_two_rooms_is_blocked_by_a_peak() {
         let rng = &mut rng(seed + 3_000_000);
         let d = axis.distance_m();
         let error = [0.5, 5.0][(seed % 2) as usize];
-        // x, y and height of the peaks in the elevation files.
+        // These are x, y and height of the peaks in the elevation files.
         let at = |(at, height): (&[i64; 2], &f64)| {
             let [lon, lat] = [
                 peaks.corner[0] + at[0] as f64 * peaks.cell[0],
@@ -374,7 +374,7 @@ fn no_hop_between_two_rooms_is_blocked_by_a_peak() {
         let places = [0.33, 0.66].map(|share| Placement {
             x_m: (share * d) as f32,
             y_m: 0.0,
-            // About as high as the peaks, so that the peaks limit the rooms.
+            // The relays fly about as high as the peaks, so that the peaks limit the rooms.
             altitude_m: (rng.random_range(-1.0..1.0) + tops[rng.random_range(0..tops.len())])
                 as f32,
         });
@@ -417,7 +417,7 @@ fn no_hop_between_two_rooms_is_blocked_by_a_peak() {
                 }
             }
         }
-        // All combinations of the ends of the rooms, with the position error, and random positions.
+        // Tested are all combinations of the ends of the rooms, with the position error, and random positions.
         for draw in 0..8_u32 {
             let mut nodes = vec![[0.0, 0.0, ground.ends[0].amsl_m]];
             for (relay, (room, place)) in [first, second].iter().zip(&places).enumerate() {

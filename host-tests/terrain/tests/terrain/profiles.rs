@@ -13,7 +13,8 @@ use uav_relay_terrain::report::{FreeSpace, TerrainReport};
 use crate::files::Raster;
 use crate::{rng, seeds};
 
-/// Returns the height of the hills at a longitude and latitude, m: up to 100 m, slopes up to 45 %.
+/// Returns the height of the hills at a longitude and latitude, m. The hills are up to 100 m high, with slopes of up to
+/// 45 %.
 fn hills(lon: f64, lat: f64) -> f64 {
     let (x, y) = ((lon - 8.0) * 75_500.0, (lat - 47.0) * 111_200.0);
     600.0 + 60.0 * (x / 300.0).sin() * (y / 350.0).cos() + 40.0 * (x / 190.0 + y / 250.0).sin()
@@ -73,7 +74,7 @@ fn profiles_are_within_a_metre_of_the_hills_along_geodesics() {
 
 /// Returns the height of a plain of 500 m with a wall of 100 m.
 ///
-/// The line Tx-Rx is 5 km to the east; the wall is 2 km from Tx.
+/// The line Tx-Rx points east and is 5 km long; the wall is 2 km from Tx.
 fn wall(lon: f64, _: f64) -> f64 {
     500.0 + (100.0 - 0.3 * (lon - 8.035_f64).abs() * 76_000.0).max(0.0)
 }
@@ -94,7 +95,7 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
         "{line}"
     );
     close(ground.ends[0].amsl_m, 510.0, 0.01);
-    // The scenario's height of the site is 2 m too high. The antenna's height counts from the ground.
+    // The site's height in the scenario is 2 m too high. The antenna's height counts from the elevation model's ground.
     close(ground.ends[1].amsl_m, 510.0, 0.01);
     let top_x = 0.025 / 0.08 * axis.distance_m();
     let free = FreeSpace {
@@ -110,7 +111,7 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
         };
         TerrainReport::new(&ground, &[place], free, 2e9, 30.0).unwrap()
     };
-    // The relay is above the wall, 20 m over its top.
+    // The relay is 20 m above the top of the wall.
     let above = report(top_x, 119.4);
     assert!(
         above
@@ -122,11 +123,11 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
     close(above.heights[0].above_ground_m, 20.0, 1.0);
     close(above.heights[0].above_obstacle_m, 20.0, 1.0);
     close(above.terrain_sir, 40.0, 1e-9);
-    // On the slope of the wall, 100 m above the plain. A part of the wall is within the position error.
+    // The relay is at the slope of the wall, 100 m above the plain. A part of the wall is within the position error.
     let foot = report(top_x + 80.0, 99.4);
     close(foot.heights[0].above_ground_m, 24.0, 1.5);
     close(foot.heights[0].above_obstacle_m, 15.0, 1.5);
-    // Behind the wall.
+    // The relay is behind the wall.
     let behind = report(2.0 * top_x, 60.0);
     let hop = &behind.hops[0];
     assert!(
@@ -151,7 +152,8 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
         (100.0 * gain).min(40.0 * gain / 0.1),
         1e-9,
     );
-    // Just over the top: inside 60 % of the first Fresnel zone, whose radius is sqrt(wavelength x / 2).
+    // The line of sight is just above the top, which is inside 60 % of the first Fresnel zone. The zone's radius is
+    // sqrt(wavelength x / 2).
     let missing = 600.0 - sight;
     let zone = 0.6 * (0.149_896 * top_x / 2.0).sqrt();
     for (over, state) in [
@@ -166,7 +168,7 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
             assert!(hop.diffraction_db > 0.0 && hop.diffraction_db < 20.0);
         }
     }
-    // A relay inside the wall.
+    // The relay is inside the wall.
     let inside = report(top_x, 50.0);
     assert!(
         inside.blocked().unwrap().contains("hop 2 (relay 1 to Rx)"),

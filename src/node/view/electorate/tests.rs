@@ -82,8 +82,8 @@ fn view(number: u32, node: u32, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks that a part of a chain decides only if it is a quorum. All parts of chains of up to seven relays are tested.
-/// A quorum is more than half of the relays, or half with the initial leader.
+/// Checks that a part of a chain decides on a view only if that part is a quorum. All parts of chains of up to seven
+/// relays are tested. A quorum is more than half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_or_half_with_the_initial_leader_decide() {
     for relays in 1..=7_u16 {

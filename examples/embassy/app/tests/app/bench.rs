@@ -77,7 +77,7 @@ impl Write for Pipe {
 }
 
 impl Pipe {
-    /// Moves received bytes to `into`, as many as fit; returns their number.
+    /// Moves as many received bytes to `into` as fit; returns their number.
     pub(crate) fn take(&self, into: &mut [u8]) -> usize {
         let mut bytes = self.bytes.borrow_mut();
         let count = bytes.len().min(into.len());
@@ -110,7 +110,7 @@ pub(crate) struct Bench {
     wiring: Wiring,
     others: Vec<Relay>,
     pub(crate) events: Vec<Event>,
-    /// Bytes in transit: first from the drone to the other relays, second to the drone.
+    /// Bytes in transit: entry 0 from the drone to the other relays, entry 1 to the drone.
     wire: [Pipe; 2],
     drone: Option<Running>,
     vehicle: Option<Vehicle>,
@@ -194,7 +194,7 @@ pub(crate) fn alone(sites: Sites) -> Placement {
     relay.setpoint().unwrap()
 }
 
-/// Tx and Rx positions for the tests, 1343.795 m apart as in the test mission.
+/// Tx and Rx positions for the tests, at the test mission's distance of 1343.795 m.
 pub(crate) const SITES: Sites = Sites {
     ends: [
         [474_000_000, 85_400_000, 420_000],
@@ -249,7 +249,7 @@ impl Bench {
         Self::wired(Wiring::Pair, 2)
     }
 
-    /// Creates a test bench whose drone shares a radio channel with relays 2 and 3. They have just started.
+    /// Creates a test bench whose drone shares a radio channel with relays 2 and 3. Both have just started.
     pub(crate) fn radio() -> Self {
         Self::wired(Wiring::Shared, 3)
     }

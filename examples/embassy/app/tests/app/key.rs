@@ -11,7 +11,7 @@ use uav_relay_kept::nor::Nor;
 use crate::bench::{Bench, SITES, block, refused};
 use crate::ram::Ram;
 
-/// Time after which a silent neighbour is surely lost, ms: 15 s and a margin.
+/// Time after which a silent neighbour certainly counts as lost, ms: 15 s plus a margin.
 const LOST: u32 = 25_000;
 
 fn epoch(flash: &Ram) -> Option<u32> {
@@ -27,7 +27,7 @@ fn neighbours_accept_the_epoch_of_every_start() {
     let mut bench = Bench::new();
     for start in 1..=4 {
         bench.boot(flash.board(&block(Some(1), None), start));
-        // A relay that was lost several times is observed for longer before it is readmitted.
+        // A relay that was lost several times is observed for a longer time before it is readmitted.
         let seen = bench.run(60_000);
         assert!(seen.contains(&Event::Converged), "start {start}: {seen:?}");
         assert_eq!(epoch(&flash), Some(start));
@@ -41,8 +41,8 @@ fn neighbours_accept_the_epoch_of_every_start() {
 
 /// Checks that a relay is rejected if it restarts with an old epoch, or with its last epoch and seed.
 ///
-/// Its frames could be replays of earlier ones. A test in the library covers the same epoch with another seed, that
-/// is, two relays with the same index.
+/// Its frames could be replays of earlier ones. A test in the library covers the same epoch with a different seed, as
+/// of a second relay with the same index.
 #[test]
 fn frames_with_a_forgotten_epoch_are_rejected() {
     for (epoch, seed) in [(1, 2), (2, 1)] {

@@ -10,7 +10,7 @@ use crate::bench::{Pipe, SITES};
 const STEP_M: f32 = 0.008;
 
 pub(crate) struct Vehicle {
-    /// Bytes in transit: first from the autopilot to the relay, second to the autopilot.
+    /// Bytes in transit: entry 0 from the autopilot to the relay, entry 1 to the autopilot.
     uart: [Pipe; 2],
     axis: Axis,
     millis: u32,
@@ -19,7 +19,7 @@ pub(crate) struct Vehicle {
     pub(crate) place: Placement,
     /// True if the drone is armed and in the air.
     pub(crate) flies: bool,
-    /// True in PX4's mode OFFBOARD, in which the relay controls the drone; otherwise the pilot does.
+    /// True in PX4's mode OFFBOARD, in which the relay controls the drone; otherwise the pilot controls it.
     pub(crate) granted: bool,
     /// Text messages for the operator that the autopilot has received from the relay.
     pub(crate) texts: Vec<String>,

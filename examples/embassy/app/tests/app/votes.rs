@@ -14,7 +14,7 @@ fn newest(flash: &Ram) -> Option<ViewRecord> {
     log.newest::<WORDS>().and_then(|kept| unpack_record(&kept))
 }
 
-/// Returns the number of the view (agreed set of members) for which the relay has promised its vote.
+/// Returns the number of the view (agreed set of members) that the relay has promised to vote for.
 ///
 /// `ViewRecord::to_bytes` has it in 4 bytes from offset 10.
 fn promised(record: &ViewRecord) -> u32 {

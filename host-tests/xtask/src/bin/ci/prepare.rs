@@ -94,7 +94,7 @@ pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     OF_DEBIAN.into_iter().try_for_each(prepare_program)
 }
 
-/// Installs cargo-fuzz in the target folder, for this project only, if it is missing there.
+/// Installs cargo-fuzz in the target folder, for this project only, if cargo-fuzz is missing there.
 fn prepare_fuzzer() -> Result<(), String> {
     if succeeds(CARGO_FUZZ, &["fuzz", "--version"]) {
         return Ok(());
@@ -145,7 +145,7 @@ fn add(needed: &[Needed]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs the Debian package of `program` if it is missing. This needs root rights.
+/// Installs the Debian package of `program` if the program is missing. The installation needs root rights.
 ///
 /// # Errors
 /// The command to type without root rights.
