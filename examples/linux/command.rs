@@ -10,7 +10,7 @@ use crate::config::{self, FileOnlySettings, FileOptions};
 
 /// Parses the command line and the file named by `--config`.
 ///
-/// `section` reads the file's section that is only for this program.
+/// `section` reads the section of the file that no other program reads.
 ///
 /// # Errors
 /// The exit status after `--help` or a mistake; the message has been printed.

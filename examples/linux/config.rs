@@ -243,11 +243,12 @@ const EXCLUDES: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Merges the `--config` file into the command line. Returns the arguments, the file's first.
+/// Merges the `--config` file into the command line. Returns the arguments from the file, followed by those of the
+/// command line.
 ///
 /// The second result has the settings that only a file can give.
 ///
-/// `section` reads the file's section that is only for this program.
+/// `section` reads the section of the file that no other program reads.
 ///
 /// # Errors
 /// One line that states the fault in the file.

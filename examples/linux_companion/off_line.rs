@@ -123,7 +123,7 @@ impl OffLineMonitor {
     }
 }
 
-/// Line from Tx to Rx, and the line with swapped latitude and longitude; the latter is `None` if invalid.
+/// Line from Tx to Rx, and the line with swapped latitude and longitude; `None` for an invalid one.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,

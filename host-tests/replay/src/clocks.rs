@@ -24,9 +24,9 @@ const WINDOW: f64 = 20.0;
 /// A step is a change of the clock offset from one common frame to the next, or a time that goes back.
 const STEP: f64 = 2.0;
 
-/// Maximum time between two capture files of one flight without a common frame, s.
+/// Maximum time between two files of one flight that have no common frame, s.
 ///
-/// Two consecutive frames of a file have the same limit.
+/// The same limit applies to two consecutive frames of one file.
 const APART: f64 = 3_600.0;
 
 /// Relation of a file's clock to the first file's clock.

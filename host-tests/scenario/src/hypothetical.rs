@@ -123,7 +123,7 @@ pub struct Fit {
     pub best_power: BestPower,
 }
 
-/// Returns the single interferer that best replaces all of `scene`; `None` if the scene has no interferers.
+/// Returns the single interferer that best replaces all in `scene`; `None` if `scene` has none.
 ///
 /// The search usually evaluates about 1 500 positions with 400 quadrature points each, 600 positions with 4 000, and
 /// one with 60 000. The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in

@@ -55,9 +55,9 @@ const SETTLED_M: f32 = 0.25;
 /// flight controller, and 1000 ms for the delay of the drone's motion.
 const BEHIND_MS: u64 = 1_200;
 
-/// Time in which the moving target's speed halves near the setpoint, ms: ln 2 / k with k = 0.5 /s.
+/// Half-life of the moving target's speed as it approaches the setpoint, ms: ln 2 / k with k = 0.5 /s.
 ///
-/// There the speed is k times the remaining distance.
+/// Near the setpoint the speed is k times the remaining distance.
 const HALVES_MS: u64 = 1_387;
 
 /// Maximum number of halvings of the speed that [`Pace::stopping_time`] counts. Eight of them reduce a remaining

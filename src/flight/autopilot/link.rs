@@ -87,7 +87,7 @@ pub struct Autopilot {
     target: Option<Target>,
     /// Position at which the moving target stops after a withdrawal of the setpoint. `None` while there is a setpoint.
     stop: Option<Placement>,
-    /// Time at which the autopilot last stopped reporting the drone's position; `None` before the first stop.
+    /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never did.
     blind_at: Option<Instant>,
     /// Start of the time in which positions are received again in [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,

@@ -47,7 +47,8 @@ pub(super) struct Observed {
     pub(super) is_received: bool,
     /// True if the drone is armed and in the air.
     pub(super) flying: bool,
-    /// True if the pilot has chosen OFFBOARD or GUIDED since this link started. In this mode the relay sets the target.
+    /// True if the pilot has chosen OFFBOARD or GUIDED since this link started. In these modes the relay sets the
+    /// target.
     pub(super) granted: bool,
     /// True if the drone's position is known.
     pub(super) located: bool,

@@ -113,7 +113,7 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns the number of the lease renewal that requires a handshake after `message`.
+    /// Returns the renewal's number if `message` belongs to a lease renewal and a handshake must follow it.
     ///
     /// `None` if `message` requires no handshake. On a shared channel one message of each lease renewal requires a
     /// handshake. By this handshake another node with the same number detects this relay, even if the chain sends no

@@ -80,7 +80,7 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side that have recently reported to receive this relay.
     pub(super) two_way: Hearing,
-    /// Neighbours that the four nearest nodes on this side have selected toward this relay; 0 for none.
+    /// Node that each of the four nearest nodes on this side has as its neighbour toward this relay; 0 for none.
     ///
     /// The entry of the nearest node is the first.
     pub(super) selection: [u16; CANDIDATES as usize],

@@ -137,7 +137,7 @@ impl Peer {
         };
     }
 
-    /// Processes the bytes delivered to the tested link. Counts frames that it must reject in `refused`.
+    /// Processes the bytes delivered to the tested link. Counts in `refused` the frames that the link must reject.
     pub(super) fn expect_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let mut parser = self.parser.clone();
         for &byte in bytes {

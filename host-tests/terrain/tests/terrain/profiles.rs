@@ -74,7 +74,7 @@ fn profiles_are_within_a_metre_of_the_hills_along_geodesics() {
 
 /// Returns the height of a plain of 500 m with a wall of 100 m.
 ///
-/// The line Tx-Rx points east and is 5 km long; the wall is 2 km from Tx.
+/// The line Tx-Rx points east; the wall is 2 km from Tx.
 fn wall(lon: f64, _: f64) -> f64 {
     500.0 + (100.0 - 0.3 * (lon - 8.035_f64).abs() * 76_000.0).max(0.0)
 }
