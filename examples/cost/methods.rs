@@ -95,7 +95,7 @@ struct Flown {
     longest: usize,
 }
 
-/// Runs one chain to its end. Not inlined, because the stack has room for one chain only.
+/// Runs one chain to its end. The function is not inlined, because the stack has room for one chain only.
 #[inline(never)]
 fn fly(mission: Mission, settings: Settings) -> Flown {
     let mut flight = Flight::new(mission, settings);

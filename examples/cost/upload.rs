@@ -7,7 +7,7 @@ use super::auth::KEY;
 use super::counter::{instructions, next_frame, relay};
 use super::missions::mission;
 
-/// Measures the instructions for relay 1 to accept an uploaded mission: its own, as version 1.
+/// Measures the instructions for relay 1 to accept an upload of its own mission as version 1.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn upload() {
     const THREE: Mission = mission(3);

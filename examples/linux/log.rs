@@ -31,7 +31,8 @@ pub struct LogOptions {
     pub log_file: Option<PathBuf>,
 }
 
-/// Identity of the program, which every log line names. Logs of several programs are read side by side.
+/// Identity of the program, which every log line names. The reason is that logs of several programs are read side by
+/// side.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// Name of the program in a text line, such as `relay 2`.

@@ -127,7 +127,7 @@ impl MissionOptions {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
-    /// Returns the mission's parameters for `relays` relays. Without `channel` it has the paper's channel.
+    /// Returns the mission's parameters for `relays` relays. Without `channel`, the mission has the paper's channel.
     ///
     /// # Errors
     /// One line that states the fault.

@@ -47,7 +47,7 @@ impl Tty {
         })
     }
 
-    /// Returns the events to poll: bytes received, and room to write after a partial write.
+    /// Returns the events to poll for: received bytes, and after a partial write also room to write.
     pub fn interest(&self) -> PollFlags {
         if self.full {
             PollFlags::IN | PollFlags::OUT

@@ -18,7 +18,7 @@ pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Logged reasons why the drone waits for its neighbours, and newer ones that may not last.
+/// Logged reasons why the drone waits for its neighbours, and newer reasons that may not last.
 #[derive(Debug, Default)]
 pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],

@@ -150,7 +150,7 @@ pub(crate) fn log_command(
     json!({ "done": is_done, "text": text })
 }
 
-/// Returns the log text about lost relays on one side that the operator reports as landed.
+/// Returns the log text about lost relays on `side` that the operator reports as landed.
 pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
     let named: Vec<u16> = named.into_iter().collect();
     let they_have = if named.len() == 1 {

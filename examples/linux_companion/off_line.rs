@@ -68,8 +68,8 @@ impl OffLineMonitor {
 
     /// Returns the report on a drone outside its geofence, if one is due.
     ///
-    /// `off_line` is the position of a drone far from the line; without it the newest measured position is used. The
-    /// geofence surrounds the line between `sites`; its width is the mission's `lateral` range.
+    /// `off_line` is the position of a drone far from the line; if it is `None`, the newest measured position is used.
+    /// The geofence surrounds the line between `sites`; its width is the mission's `lateral` range.
     pub(crate) fn check(
         &mut self,
         now: Instant,

@@ -36,7 +36,7 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position and the newest times since the last call; `None` if not received.
+    /// Returns the newest position and the newest times since the last call; `None` for a missing value.
     ///
     /// The times are the remaining flight time and the time to fly home, s; NaN if invalid. Passes measurements to
     /// `on_sample`, and logs the first invalid line. Work: that of one call of [`Fifo::read`].

@@ -190,7 +190,7 @@ impl Report {
         again
     }
 
-    /// Logs a rejected upload. If it violates the geofence, the line has the permitted range.
+    /// Logs a rejected upload. If the upload violates the geofence, the line states the permitted range.
     fn refused(&self, now: Instant, why: LineError) {
         const EVENT: &str = "upload refused";
         let range_m = match (why, self.fence) {

@@ -33,7 +33,7 @@ impl AnswerMonitor {
         }
     }
 
-    /// Handles the received kind of data. Returns the kind of fault to report; each one is returned once.
+    /// Handles the received kind of data. Returns the kind of fault to report; each kind is returned once.
     ///
     /// `received` is `None` once the autopilot is found.
     pub(crate) fn check(&mut self, now: Instant, received: Option<Received>) -> Option<Received> {

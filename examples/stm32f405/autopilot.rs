@@ -101,7 +101,7 @@ impl Autopilot {
 
     /// Processes bytes from the autopilot, and exchanges data with the relay.
     ///
-    /// The relay's next frames contain the drone's newest position.
+    /// So the relay's next frames contain the drone's newest position.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         self.receive(now);
         self.link.exchange(relay, now);
@@ -169,7 +169,8 @@ fn open(uart: Uart) -> Option<Port> {
 /// Error: the block has an autopilot key, but this image cannot sign.
 struct CannotSign;
 
-/// Enables signing to the autopilot if the block has a key. Without a clock, received timestamps give the time.
+/// Enables signing to the autopilot if the block has a key. The board has no clock, so received timestamps give the
+/// time.
 #[cfg(feature = "mavlink-signing")]
 #[expect(clippy::unnecessary_wraps, reason = "as where it cannot")]
 fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {

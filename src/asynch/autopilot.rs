@@ -71,7 +71,7 @@ impl AsyncAutopilot {
 
     /// Completes with the next event of the autopilot link.
     ///
-    /// Only one task can wait at a time: a second one replaces the first, which is no longer woken. If the future is
+    /// Only one task can wait at a time: a second task replaces the first, which is no longer woken. If the future is
     /// dropped, the event is kept for the next call. Constant work per poll.
     pub fn next_event(&self) -> impl Future<Output = AutopilotEvent> + '_ {
         poll_fn(|cx| {

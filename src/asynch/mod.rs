@@ -135,8 +135,8 @@ use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::track_pending;
 
-/// Ports of a relay with two links, one to each neighbour. A link with a driver-enable pin is half duplex, one without
-/// it is full duplex.
+/// Ports of a relay with two links, one to each neighbour. A link with a driver-enable pin is half duplex, a link
+/// without a pin is full duplex.
 #[derive(Debug)]
 pub struct AsyncPair<UR, UW, DR, DW, UPin = NoPin, DPin = NoPin> {
     upstream: AsyncLink<UR, UW, UPin>,

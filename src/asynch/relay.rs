@@ -103,8 +103,8 @@ impl<'a> AsyncRelay<'a> {
         self.changed.set(false);
     }
 
-    /// Completes once the relay has input that the task of the ports has not handled. Completes at once if there is
-    /// such input already.
+    /// Completes once the relay has input that the task of the ports has not handled. If there already is such input,
+    /// this completes at once.
     pub(super) fn changed(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             store_waker(&self.runner, cx);

@@ -489,8 +489,8 @@ pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
 /// Returns sine and cosine of an angle in units of 10⁻⁷ degrees, within a unit in the last place.
 ///
-/// The angle is reduced to an eighth of a turn in integers, without an error. Sine and cosine of the rest are fdlibm's
-/// series. A general function for f64 would be ten times as large.
+/// The angle is reduced to an eighth of a turn in integers, without an error. Sine and cosine of the remaining angle
+/// are computed by fdlibm's series. A general function for f64 would be ten times as large.
 #[inline(never)] // called from several places
 pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     const EIGHTH: i32 = 450_000_000;

@@ -152,7 +152,8 @@ impl Ground {
         }
     }
 
-    /// Queries the mission that the relays fly; [`Ground::flown`] returns the answer. Ends an upload in progress.
+    /// Queries the mission that the relays fly; [`Ground::flown`] returns the answer. The query ends an upload in
+    /// progress.
     ///
     /// The polled relay also sends the uploaded mission that it has stored, if any. The station thus learns the changes
     /// made by earlier uploads.
@@ -347,7 +348,7 @@ impl Ground {
     }
 
     /// Handles a hello of relay `by`, `distance` relays away, that answers the query for the mission. If the relay has
-    /// stored an uploaded mission, it sends it in its next message.
+    /// stored an uploaded mission, its next message contains this mission.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
@@ -759,7 +760,7 @@ pub enum Progress {
     /// No mission upload is in progress.
     #[default]
     Idle,
-    /// The mission is being offered. No relay has reported yet that it has stored it.
+    /// The mission is being offered. No relay has reported yet that it has stored the mission.
     Offering,
     /// A relay has stored the mission. The station polls until the relays fly it.
     Stored {
@@ -819,7 +820,7 @@ impl PendingReports {
     };
 
     /// Records the measured interference `power_w`, W, to be reported to the `reach` nearest relays. Returns true if a
-    /// handshake must be sent to them first.
+    /// handshake must be sent to these relays first.
     pub(super) fn record(&mut self, power_w: f32, reach: u16) -> bool {
         self.power_w = power_w;
         self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));

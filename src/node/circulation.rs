@@ -55,7 +55,7 @@ const MEMORY: u8 = 8;
 pub(crate) enum Stage {
     /// No message is known.
     Idle,
-    /// The message must be forwarded or has been forwarded, and the reply has not arrived yet.
+    /// The reply has not arrived yet. The message has been forwarded, or must be forwarded next.
     Outstanding,
     /// The result of the message is known.
     Completed,
@@ -235,7 +235,8 @@ impl Circulation {
         self.await_result(now, path);
     }
 
-    /// Schedules a retransmission if the result is still awaited. Called when the next relay is reachable again.
+    /// Schedules a retransmission if the result of the message is still awaited. Called when the next relay is
+    /// reachable again.
     pub(crate) const fn resend(&mut self) {
         self.is_forward_due |= self.is_outstanding();
     }

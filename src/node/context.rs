@@ -74,8 +74,8 @@ pub(crate) struct Context<'a> {
     pub(crate) latest: MissionId,
     /// True if this relay is the last one: it has no neighbour on the side away from the leader.
     pub(crate) end: bool,
-    /// Remaining lease times of other relays. The positions of a new view must not be used before these leases have
-    /// ended.
+    /// Remaining lease times of other relays. Until these leases have ended, no relay may use the positions of a new
+    /// view.
     pub(crate) other_leases: OtherLeases,
 }
 
@@ -162,8 +162,8 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Remaining lease times of other relays, as far as this relay knows. During its lease a relay may use the agreed
-/// positions.
+/// Remaining lease times of other relays, as far as this relay knows. A relay may use agreed positions during its own
+/// lease.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
     /// Upper bound of the remaining lease time of the other members of this view. This relay knows it, because every
@@ -209,7 +209,7 @@ pub(crate) struct Effects {
     pub(crate) resent: bool,
     /// True if this step started a message along the chain or a view proposal.
     pub(crate) began: bool,
-    /// True if the relays must agree on a new view (list of the chain's members).
+    /// True if this step has found that a new view (list of the chain's members) is needed.
     pub(crate) view_needed: bool,
     /// Neighbour that has replied to a message of this relay, and the transmission time of this message. The neighbour
     /// was alive after that time. `None` without a reply.

@@ -109,7 +109,7 @@ pub(crate) struct IndexClaims {
     next_claim: Option<Instant>,
     /// Interval between the next unasked claim and the one after it.
     interval: Duration,
-    /// Number of claims still to be sent to defend this relay's node number. The interval between them is
+    /// Number of claims still to be sent against a duplicate of this relay's node number. The interval between them is
     /// [`least_interval`].
     defences: u8,
     /// Earliest time at which the next claim may be scheduled. This limits the rate of Claim messages.
@@ -308,7 +308,7 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts periodic claims, on links without a key or while this relay defends its node number.
+    /// Starts periodic claims: on wired links without a key, or while `defences` is above 0.
     ///
     /// On a shared channel a relay receives the frames of a duplicate directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
@@ -333,7 +333,8 @@ impl IndexClaims {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }
 
-    /// Handles expired timers of the claims to the node number. Returns true if the passive relay becomes active.
+    /// Handles expired timers of the claims to the node number. Returns true if this relay was passive and becomes
+    /// active.
     pub(crate) fn handle_timeout(&mut self, now: Instant, settings: &Settings) -> bool {
         if self.passive_until.is_some_and(|until| until <= now) {
             self.activate(now, settings);
@@ -365,8 +366,7 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Handles the report that the other node with this relay's number is gone. Returns true if this relay becomes
-    /// active.
+    /// Handles the report that the duplicate of this relay's number is gone. Returns true if this relay becomes active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {

@@ -79,8 +79,8 @@ pub(crate) struct Lease {
     accepted: (ViewId, Instant),
     /// Latest time at which a lease from before the accepted view can end; `None` if unknown.
     older_leases_end: Option<Instant>,
-    /// True once this relay knows that all members have accepted the view. Every completed lease renewal proves it,
-    /// because every member takes part in it.
+    /// True once this relay knows that all members have accepted the view. Every completed lease renewal proves this,
+    /// because every member takes part in the renewal.
     is_whole: bool,
     /// True once this relay has agreed on its position in this view.
     is_agreed: bool,
@@ -200,8 +200,8 @@ impl Lease {
         orders
     }
 
-    /// Extends `vouched_until` by the maximum duration of a lease, after a restart of this relay. Other members can
-    /// still have a lease from before the restart.
+    /// Extends `vouched_until` by the maximum duration of a lease, after a restart of this relay. Other members may
+    /// still have leases that they got before the restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }

@@ -49,7 +49,7 @@ struct Asked {
     last: Instant,
 }
 
-/// Mission offers to the neighbour on one side, and replies to the ground station there.
+/// Mission offers to the neighbour on one side, and replies to the ground station on that side.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
     /// Nonce in the neighbour's last hello, repeated by the next offer to it. 0 without a hello.

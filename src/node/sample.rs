@@ -163,7 +163,7 @@ pub(super) struct SensorState {
     pub(super) off: bool,
     /// Node whose measurements the last collection left out; 0 for none.
     pub(super) left_out: u16,
-    /// Node whose sensor counts as faulty, as found by the leader or by the node itself; 0 for none.
+    /// Node whose sensor counts as faulty, according to the leader or the node itself; 0 for none.
     pub(super) named: u16,
     /// State of the leader's search for a faulty sensor. The search leaves out the measurements of one relay after the
     /// other.
@@ -238,7 +238,7 @@ impl Sensing {
         sensors.first_mut()
     }
 
-    /// Resets the sensing for a new view. The leader then distributes its estimate to all relays first.
+    /// Resets the sensing for a new view. In a new view, the leader first distributes its estimate to all relays.
     pub(super) const fn renew(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
             sensor.is_distributed = false;

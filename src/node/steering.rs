@@ -41,7 +41,7 @@ struct Motion {
 
 /// Stepwise motion of the setpoint to a new agreed position.
 ///
-/// It takes the same time at all relays of a chain, so that they arrive together.
+/// The motion takes the same time at all relays of a chain, so that they arrive together.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     /// Agreed position at the last call of `advance`. `wanted`, the position to fly to now, approaches it in steps.
@@ -134,7 +134,8 @@ impl Steering {
         way: [Way::NONE; DEPARTURES as usize],
     };
 
-    /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.
+    /// Creates the guard, if `settings` request one. `neighbours` are the node numbers of the upstream and the
+    /// downstream neighbour.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,

@@ -367,8 +367,8 @@ impl Relay {
 
     /// Confirms that `record`, returned by [`unpersisted`](Self::unpersisted), is stored. Takes constant time.
     ///
-    /// A firmware without storage confirms each record at once. After a reboot its relay must then stay off for the
-    /// rest of the flight. If the votes have changed meanwhile, `unpersisted` returns the newer record.
+    /// A firmware without storage confirms each record at once. After a reboot the relay of such a firmware must stay
+    /// off for the rest of the flight. If the votes have changed meanwhile, `unpersisted` returns the newer record.
     pub const fn persisted(&mut self, record: &ViewRecord) {
         self.node.persisted(record);
     }
@@ -508,8 +508,8 @@ impl Relay {
 
     /// Returns an upper bound of the worst hop's SIR at the current altitudes, for any x, linear.
     ///
-    /// The leader (the relay that starts the search) knows it after Algorithm 1 or 4. `None` at other relays, and with
-    /// the paper's fixed-step schedule, which gives no such bound.
+    /// The leader (the relay that starts the search) knows it after Algorithm 1 or 4. `None` at all other relays, and
+    /// with the paper's fixed-step schedule, which gives no such bound.
     pub fn bound(&self) -> Option<f32> {
         self.node.round().bound()
     }
@@ -607,7 +607,7 @@ impl Relay {
 
     /// Returns the chain's newest estimate of the interferer, and its number.
     ///
-    /// Before the first estimate it is the interferer that the mission configures.
+    /// Before the first estimate, the result is the interferer that the mission configures.
     pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }

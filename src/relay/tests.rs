@@ -19,8 +19,8 @@ fn relay(auth: Option<Auth>) -> Relay {
     Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
 }
 
-/// Checks that a signing relay stops sending once its frame counter is used up. If counters repeated, a recorded
-/// frame could pass for a new one.
+/// Checks that a signing relay stops sending once its frame counter is used up. If counters were used again, a recorded
+/// frame could count as a new one.
 #[test]
 fn a_signing_relay_stops_at_its_last_counter() {
     let auth = Auth {

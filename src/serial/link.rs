@@ -274,7 +274,8 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads from the serial port that failed for a reason not counted above.
     pub other: u32,
-    /// Number of failed writes, and of failed queries whether all bytes have left the port. Failed writes are repeated.
+    /// Number of failed writes, and of failed queries of the port about bytes that have not left it. Failed writes are
+    /// repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each attempt is repeated.
     pub pin: u32,

@@ -31,7 +31,8 @@ error_texts!(Fault {
 ///
 /// [`Nb`] and [`Io`] adapt a HAL's port; a firmware with its own queues or DMA can implement it directly.
 pub trait SerialPort {
-    /// Moves received bytes to the front of `into` (never empty), and returns their number. 0 if there are none.
+    /// Moves received bytes to the front of `into` (never empty), and returns their number. The number is 0 if no bytes
+    /// were received.
     ///
     /// # Errors
     /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
@@ -46,7 +47,7 @@ pub trait SerialPort {
     /// Returns true if the last bit of all accepted bytes has left the port; `None` if unknown.
     ///
     /// # Errors
-    /// [`Fault`] if the query fails; it is treated as `None`.
+    /// [`Fault`] if the query fails; the caller treats an error as `None`.
     fn has_left(&mut self) -> Result<Option<bool>, Fault>;
 }
 

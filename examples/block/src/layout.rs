@@ -33,7 +33,7 @@ pub(super) struct Layout {
     pub(super) tolerance: F32,
     /// Channel: carrier frequency (Hz), two excess losses (factors), and the line-of-sight weight (0 to 1).
     ///
-    /// The excess losses are with and without line of sight.
+    /// The first excess loss is for line of sight, the second for no line of sight.
     pub(super) channel: [F64; 4],
     pub(super) band: [F32; 2],
     pub(super) lateral: [F32; 2],

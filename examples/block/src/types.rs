@@ -31,7 +31,7 @@ pub struct Config {
     /// Settings for estimating an unknown interferer from measurements; `None` without such an estimation.
     pub listen: Option<Listen>,
     /// Tx and Rx positions, and the drone's speed limit; `None` without an autopilot. `uav_relay::flight::course`
-    /// checks them.
+    /// checks these values.
     pub sites: Option<Sites>,
     /// Silence after which a neighbour is asked for a heartbeat, ms; 0 for the default, 5 s.
     pub probe_after_ms: u32,

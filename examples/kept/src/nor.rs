@@ -8,10 +8,11 @@ use crate::journal::{BLANK, Flash};
 
 const WORD: usize = 4;
 
-/// Number of words per read or write of the flash. A driver call takes longer than the transfer of a word.
+/// Number of words per read or write of the flash. Several words are read at once, because a driver call takes longer
+/// than the transfer of a word.
 const PIECE: usize = 16;
 
-/// Two sectors of a NOR flash, given by their offsets. Each consists of one or more erase units.
+/// Two sectors of a NOR flash, given by their offsets. Each sector consists of one or more erase units.
 ///
 /// The flash must read and write whole words.
 #[derive(Debug)]

@@ -66,7 +66,7 @@ impl Views {
 
     /// Stores the relay's changed votes.
     ///
-    /// Returns `Some(true)` when storing begins to work, `Some(false)` when it begins to fail, otherwise `None`.
+    /// Returns `Some(true)` when storing works again, `Some(false)` when storing begins to fail, otherwise `None`.
     ///
     /// If the write fails, the relay flies on: a drone in the air must not be stopped for a failed write.
     #[inline(never)] // rarely called

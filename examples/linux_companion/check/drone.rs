@@ -116,7 +116,7 @@ impl Drone {
         self.heard.is_some() && !self.is_armed()
     }
 
-    /// Returns true if the autopilot is armed or in the air. Then the check sends nothing to the neighbours.
+    /// Returns true if the autopilot is armed or in the air. While it is, the check sends nothing to the neighbours.
     pub(super) fn is_armed(&self) -> bool {
         self.is_in_air || self.heard.is_some_and(|heard| heard.is_armed)
     }

@@ -34,7 +34,7 @@ use radio::Radio;
 /// Line of the check: subject and finding.
 pub(crate) type Line = (&'static str, Finding);
 
-/// Time for which the check still answers its neighbours after its lines are green.
+/// Time for which the check still answers its neighbours after all lines of the check are green.
 ///
 /// The neighbours may be running a check of their own.
 const LINGER: Duration = Duration::from_millis(5_000);
@@ -53,7 +53,7 @@ const RULES: &str = "70-uav-relay.rules";
 
 /// Checks this computer, then the autopilot and the neighbours for at most `limit`.
 ///
-/// At first it only receives. Prints all lines; returns true if all are green.
+/// At first the check only receives. Prints all lines; returns true if all are green.
 pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     let options = &plan.options;
     let (mut lines, ports) = ports(plan);
@@ -323,7 +323,7 @@ fn records(plan: &Plan) -> Vec<Line> {
     lines
 }
 
-/// Checks the bundle's udev rules; `None` if there are none and no port needs one.
+/// Checks the bundle's udev rules; `None` if there are no rules and no port needs one.
 fn rules(plan: &Plan) -> Option<Line> {
     let options = &plan.options;
     let ports = [&options.upstream, &options.downstream, &options.shared];

@@ -27,7 +27,7 @@ pub fn unsigned(header: Header, body: &[u8]) -> Vec<u8> {
     sealed(before(header, 0, body))
 }
 
-/// Returns the frame `plain` as on the wire: COBS (by another crate), and the delimiter.
+/// Returns the frame `plain` as on the wire: encoded by COBS (of a second crate), with the delimiter.
 pub fn stuffed(plain: &[u8]) -> Vec<u8> {
     let mut out = cobs::encode_vec(plain);
     out.push(0);

@@ -86,7 +86,7 @@ fn is_view(range: &str, view: u32) -> bool {
     }
 }
 
-/// Access to the numbers of a body by field name; NaN if there is none.
+/// Access to the numbers of a body by field name; NaN for a field that the body lacks.
 pub(crate) struct Numbers<'a, 'f>(pub(crate) &'a Fields<'f>);
 
 impl<'f> Numbers<'_, 'f> {
@@ -129,7 +129,7 @@ impl<'f> Numbers<'_, 'f> {
     }
 }
 
-/// Checks the rules between fields; returns the name of the first field that breaks one.
+/// Checks the rules between fields; returns the name of the first field that breaks a rule.
 fn check_rules(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
     let get = |name| numbers.get(name);
     let zero = |name| numbers.is_zero(name);

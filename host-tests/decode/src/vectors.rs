@@ -80,7 +80,7 @@ pub struct Ladder {
     pub anchor: String,
     /// Code of the gap from the anchor to the next targets (a ratio); 0 for a single target.
     pub gap: u8,
-    /// Code of the factor from each gap to the next one, away from the anchor.
+    /// Code of the factor between two consecutive gaps, counted away from the anchor.
     pub growth: u8,
     /// Target SIRs: the bits of each f32, hexadecimal.
     pub targets: Vec<String>,

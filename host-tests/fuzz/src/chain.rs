@@ -165,7 +165,7 @@ impl Chain {
         }
     }
 
-    /// Delays the oldest frame to relay `at` until all others in transit to it have arrived.
+    /// Delays the oldest frame to relay `at` until all other frames in transit to this relay have arrived.
     fn delay_frame(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()
@@ -331,7 +331,7 @@ impl Chain {
         }
     }
 
-    /// Checks relay `at` in its view (membership of the chain): its index, and the number of relays.
+    /// Checks the index of relay `at` in its view (membership of the chain), and the view's size.
     ///
     /// On neither side of the relay may the view have more relays than the mission.
     fn check_place(&self, at: usize) {

@@ -183,7 +183,7 @@ pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     }
 }
 
-/// Reads a lateral position, m, in the lateral range or outside; 0 without a range.
+/// Reads a lateral position, m, inside or outside of the mission's lateral range; 0 without a range.
 pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     if lateral.is_single() {
         0.0

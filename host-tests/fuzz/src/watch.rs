@@ -120,7 +120,7 @@ impl Watched {
         self.frames.association
     }
 
-    /// Returns the number in the relay's last hello, 0 for none. A mission offer must repeat it.
+    /// Returns the number in the relay's last hello, 0 for none. A mission offer must repeat this number.
     pub const fn offer_number(&self) -> u16 {
         self.frames.asked
     }
@@ -315,7 +315,7 @@ impl Watched {
 
     /// Checks the relay's agreed position.
     ///
-    /// It must be between Tx and Rx, in the lateral range, and at an altitude permitted for this relay.
+    /// The position must be between Tx and Rx, in the lateral range, and at an altitude permitted for this relay.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.agreed_place();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {

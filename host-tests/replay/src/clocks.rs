@@ -64,7 +64,7 @@ impl Segment {
 ///
 /// They come from frames sent in one file and received in the other.
 ///
-/// `equal` has the offsets by all other frames.
+/// `equal` has the offsets that follow from all other frames.
 #[derive(Default)]
 struct Window {
     times: Vec<f64>,
@@ -139,7 +139,7 @@ pub struct Merged {
 /// Merges the frames of all files.
 ///
 /// # Errors
-/// One line with a file that belongs to another chain or flight.
+/// One line that names a file of a different chain or flight.
 pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     let mut warnings = Vec::new();
     if let Some(first) = files.first() {
@@ -284,7 +284,7 @@ fn is_copy(one: &Recording, other: &Recording) -> bool {
         .all(|(a, b)| (a.at, a.direction, &a.wire) == (b.at, b.direction, &b.wire))
 }
 
-/// Checks by its clock that a file without common frames is of the same flight.
+/// Checks by its clock that a file without common frames belongs to the same flight.
 ///
 /// `span` has the first and the last time of the other files, s.
 fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {

@@ -100,7 +100,7 @@ pub struct Flight {
     pub losses: Vec<Loss>,
     /// Agreed views (memberships of the chain): time, s, view number, and number of relays.
     pub views: Vec<(f64, u32, u16)>,
-    /// Closest approach of two relays in the air, if two were in the air at once.
+    /// Closest approach of two relays in the air, `None` if two were never in the air at the same time.
     pub nearest: Option<Nearest>,
 }
 
@@ -266,8 +266,8 @@ struct Recorder<'a> {
     silent_at: Instant,
     /// Time of the first agreement, s, and numbers of snapshots since then.
     ///
-    /// All snapshots; those with agreed positions of all relays; those with agreed positions of all members of the
-    /// view.
+    /// The numbers are: all snapshots; snapshots in which all relays have agreed positions; snapshots in which all
+    /// members of the view have.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 
@@ -508,7 +508,7 @@ impl<'a> Recorder<'a> {
 
 /// Removes the part about received frames from an alarm.
 ///
-/// A replay does not know what the station received.
+/// A replay has no data about the frames that the station received.
 fn replayed(text: String) -> String {
     match text.split_once("nothing received from the chain") {
         Some(("", rest)) => {

@@ -37,8 +37,8 @@ pub struct Replay {
 
 /// Reads the captures `files` of one flight, and creates its page. The first file has the reference clock.
 ///
-/// Without `scenario` the default scenario is used, if the relays report the digest of its mission. Otherwise the
-/// mission is unknown.
+/// Without `scenario` the default scenario is used, if the relays report the digest of that scenario's mission.
+/// Otherwise the mission is unknown.
 ///
 /// # Errors
 /// One line that names the file and the fault.
@@ -92,7 +92,7 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
 
 /// Returns the scenario's mission with the digest `digest`, with equal or fitted slots, if it matches.
 ///
-/// Without `digest` the slots are equal.
+/// If `digest` is `None`, the mission has equal slots.
 fn loaded(scenario: &Scenario, relays: u16, digest: Option<u16>) -> Result<Option<Loaded>, String> {
     let (plain, profiles) =
         mission(scenario, relays, TOLERANCE).map_err(|error| error.to_string())?;

@@ -18,7 +18,7 @@ use uav_relay_replay::{clocks, page};
 /// State in a report: the pilot flies the drone.
 const FLOWN: u16 = 4_096;
 
-/// Returns a frame with a report: relay `relay` is at `x_m` on the line at the time `at`, s.
+/// Returns a frame with a report: at the time `at`, s, relay `relay` is at `x_m` on the line Tx-Rx.
 fn report(at: f64, relay: u16, x_m: f32) -> Frame {
     let place = Placement {
         x_m,

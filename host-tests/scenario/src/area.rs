@@ -15,7 +15,8 @@ pub enum Area {
         /// Radius, m, > 0.
         radius_m: f64,
     },
-    /// Polygon, convex or not, as the list of its corners in order. The first corner is not repeated at the end.
+    /// Polygon, convex or not, as the list of its corners in order. The list does not repeat its first corner at the
+    /// end.
     Polygon(Vec<[f64; 2]>),
 }
 
@@ -107,7 +108,7 @@ impl Area {
         self.nearest([x + sum[0] / (3.0 * area), y + sum[1] / (3.0 * area)])
     }
 
-    /// Returns the smallest x and y of the area, and its largest x and y, m.
+    /// Returns two points, m: smallest x and y of the area, then largest x and y.
     pub fn bounds(&self) -> [[f64; 2]; 2] {
         match self {
             Self::Circle {

@@ -94,7 +94,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` if its table also has a key that excludes it, such as `power_w` and `power_dbm`.
+    /// Rejects `key` if its table also has a key that `key` excludes, such as `power_w` and `power_dbm`.
     fn check_exclusive(
         &self,
         path: &str,

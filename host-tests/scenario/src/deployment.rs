@@ -79,7 +79,8 @@ pub struct Companion {
     pub autopilot_key_file: Option<PathBuf>,
     /// Greatest speed of the drone, m/s, 0.1 to 20.
     pub speed_m_s: Option<f32>,
-    /// Flight time that the drone keeps as a reserve, s, 0 to 3600. `None`: the relay never leaves the chain by itself.
+    /// Flight time that the drone keeps as a reserve, s, 0 to 3600. With `None` the relay never leaves the chain by
+    /// itself.
     pub reserve_s: Option<f32>,
     /// Flight time with a full battery, s, 1 to 21600.
     pub flight_time_s: Option<f32>,
@@ -155,7 +156,7 @@ pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, Sce
         .map_err(|error| check::internal_mismatch(file, &error))
 }
 
-/// Checks that `[network]` and `[plan]` have the same number of relays, if both give it.
+/// Checks that `[network]` and `[plan]` have the same number of relays, if both state a number.
 ///
 /// # Errors
 /// The error names the key, its value and the plan's number of relays.

@@ -16,7 +16,7 @@ pub struct ScenarioError {
     pub file: String,
     /// Location: a key such as `relay[1].index`, or a line and column. `None` if the mistake concerns the whole file.
     pub key: Option<String>,
-    /// Wrong value as TOML, cut if it is long; `None` if the mistake is not in a value.
+    /// Wrong value as TOML, shortened if it is long; `None` if the mistake is not in a value.
     pub value: Option<String>,
     /// Kind of the mistake in the scenario file.
     pub problem: Problem,
@@ -74,7 +74,7 @@ pub enum Problem {
     NoInterference,
     /// Two `[[relay]]` tables have the same index.
     DuplicateRelay,
-    /// A `[[relay]]` table is useless: it gives the relay neither an altitude nor a power of its own.
+    /// A `[[relay]]` table is useless, because it states neither an altitude nor a power.
     NothingDiffers,
     /// The distance from Tx to Rx in the file differs from the distance between their geographic positions.
     OtherDistance,

@@ -65,7 +65,7 @@ struct RawNoFly {
 
 /// Area in a scenario file: exactly one of these keys is given.
 ///
-/// Keys that end in `_deg` have latitudes and longitudes, degrees. The other keys have x and y, m.
+/// Values of keys that end in `_deg` are latitudes and longitudes, degrees. The other keys have x and y, m.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawArea {
@@ -605,7 +605,7 @@ struct RawSite {
 
 /// Returns the geographic line from Tx to Rx (`None` if the file has no `[site]`), and its length, m.
 ///
-/// With `[site]` the length is computed from the positions of Tx and Rx, and a `distance_m` that differs is an error.
+/// With `[site]` the length is computed from the positions of Tx and Rx, and a different `distance_m` is an error.
 /// Without `[site]` the length is `distance_m`.
 pub(super) fn line(
     file: &str,
@@ -710,7 +710,7 @@ pub(super) struct Powers {
 
 /// Power of a sender in a scenario file: in W, in dBm, or as an EIRP.
 ///
-/// Each value has the name of its key.
+/// Each value comes with the name of its key.
 pub(super) struct GivenPower<'a> {
     /// Prefix of the keys' names in error messages: the table with a dot, such as `interferer[0].`
     pub(super) table: &'a str,

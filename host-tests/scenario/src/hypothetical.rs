@@ -271,7 +271,7 @@ impl Space {
 
     /// Returns the grid of x for the search, m.
     ///
-    /// Its spacing is D / 16 at the middle between Tx and Rx, and grows toward both ends. D is the distance from Tx to
+    /// The spacing is D / 16 at the middle between Tx and Rx, and grows toward both ends. D is the distance from Tx to
     /// Rx.
     fn columns(&self) -> Vec<f64> {
         let half = 0.5 * self.distance_m;

@@ -195,7 +195,7 @@ impl Radio {
     /// `option_hz` is the bandwidth in a command's option; `None` uses the bandwidth in the scenario.
     ///
     /// # Errors
-    /// [`BandwidthError`] if there is no bandwidth, or if option and scenario differ.
+    /// [`BandwidthError`] if there is no bandwidth, or if the two bandwidths differ.
     pub fn new(scenario: &Scenario, option_hz: Option<f64>) -> Result<Self, BandwidthError> {
         let link = scenario.link.clone().unwrap_or_default();
         if let (Some(option_hz), Some(file_hz)) = (option_hz, link.bandwidth_hz)

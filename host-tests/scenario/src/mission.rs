@@ -19,7 +19,7 @@ use crate::{Interference, Scenario, Source};
 pub enum Refusal {
     /// An interferer may be anywhere in an area, but a mission needs one position.
     ///
-    /// The fields are the index of the interferer, from 0, and the middle of its area, x and y, m.
+    /// The fields are the index of the interferer, from 0, and the middle of its area as x and y, m.
     Area(usize, [f64; 2]),
     /// The scenario has several interferers, and no single hypothetical interferer can replace them.
     NoHypothetical,
@@ -32,7 +32,8 @@ pub enum Refusal {
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// Fitted slots with a table of rate steps. Relays compute fitted slots only by Shannon's formula.
+    /// The scenario combines fitted slots with a table of rate steps. Relays compute fitted slots only by Shannon's
+    /// formula.
     Steps,
     /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),
@@ -186,7 +187,7 @@ pub fn with_access(scenario: &Scenario, mission: &Mission) -> Result<Mission, Re
 
 /// Returns the single interferer that best replaces the scenario's interferers.
 ///
-/// `None` if there are fewer than two, or if the search finds none.
+/// `None` if there are fewer than two interferers, or if the search finds none.
 pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     match &scenario.interference {
         Interference::Sources(sources) if sources.len() > 1 => {
@@ -269,7 +270,7 @@ pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
 
 /// Converts the scenario's random field of interference to the field of a mission.
 ///
-/// The memory of its points is never freed, because a mission borrows them for the lifetime of the program.
+/// The memory of the field's points is never freed, because a mission borrows them for the lifetime of the program.
 fn field(spec: &crate::Field) -> Result<Field, FieldError> {
     let points: Option<Vec<FieldPoint>> = spec
         .beta

@@ -78,7 +78,7 @@ pub struct Scene {
     pub mu_nlos: f64,
     /// Path-loss factor eta between a relay and the ground, 1/m^2, > 0. The path loss at distance d is eta d^2.
     pub eta: f64,
-    /// Noise power of every receiver, W, >= 0. If it is above 0, the methods that return SIRs return SINRs.
+    /// Noise power of every receiver, W, >= 0. With noise above 0, methods that return SIRs return SINRs.
     pub noise_w: f64,
     /// Altitude limits of relays without a fixed altitude, and lateral limits of all relays.
     pub band: Corridor,
@@ -190,9 +190,9 @@ impl Scene {
         .sum()
     }
 
-    /// Returns the power of each source, W, and the offset from it to (`x`, `y`), m.
+    /// Returns the power of each interferer, W, and the offset from it to (`x`, `y`), m.
     ///
-    /// A source with an area is at the area's point nearest to (`x`, `y`).
+    /// An interferer with an area is at the area's point nearest to (`x`, `y`).
     pub fn offsets(&self, x: f64, y: f64) -> impl Iterator<Item = (f64, [f64; 2])> {
         let each = self.sources.iter().enumerate();
         each.map(move |(at, source)| {
@@ -339,7 +339,7 @@ fn relay(scenario: &Scenario, index: u16) -> Relay {
     }
 }
 
-/// Returns the received power, W: `power_w` / (`factor` d^2). The offset (`dx`, `dy`, `dz`), m, has the length d.
+/// Returns the received power, W: `power_w` / (`factor` d^2). d is the length of the offset (`dx`, `dy`, `dz`), m.
 fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }

@@ -63,7 +63,7 @@ pub struct Scenario {
     pub link: Option<Link>,
     /// Required SIR toward Tx, as a fraction (0 to 1) of the required SIR toward Rx.
     ///
-    /// With 0, only the direction from Tx to Rx counts.
+    /// 0 means traffic from Tx to Rx only.
     pub reverse: f64,
     /// Relays with their own altitude or power, by index (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
@@ -82,7 +82,7 @@ pub struct TerrainSpec {
     pub mast_m: f64,
     /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
     ///
-    /// The height counts from the highest ground at the positions where the relay may be within its position error.
+    /// The height counts from the highest ground within the relay's position error.
     pub above_ground_m: f64,
     /// Greatest height of a relay above the ground, m, 0.1 to 1e4; `None` for no limit.
     ///
@@ -90,7 +90,7 @@ pub struct TerrainSpec {
     pub above_ground_max_m: Option<f64>,
     /// Error of the heights in the elevation files, m, 0 (its default) to 100.
     ///
-    /// The planner raises the ground between two antennas by up to this error.
+    /// Between two antennas, the planner assumes that the ground is higher by up to this error.
     pub error_m: f64,
 }
 
@@ -174,7 +174,7 @@ pub struct Noise {
     pub bandwidth_hz: f64,
     /// Noise figure of the receivers, dB, 0 to 60; 6 by default.
     pub figure_db: f64,
-    /// Noise power, dBm, -200 to 0. If given, it is used instead of the noise power computed from bandwidth and noise
+    /// Noise power, dBm, -200 to 0. If given, this value replaces the noise power computed from bandwidth and noise
     /// figure.
     pub power_dbm: Option<f64>,
     /// Antenna gains, dBi, -30 to 60; 0 by default. Entry 0 is for the relays, entry 1 for Rx.
@@ -263,7 +263,7 @@ pub struct Source {
 pub struct Field {
     /// Upper bound on the received interference power, W, 1e-30 to 1e6.
     pub i_max_w: f64,
-    /// Beta distributions at some positions, x strictly increasing. Never empty if read from a file.
+    /// Beta distributions at some positions, x strictly increasing. A list read from a file is never empty.
     pub beta: Vec<BetaPoint>,
 }
 

@@ -35,10 +35,10 @@ const IN_FEET: [u16; 15] = [
     5614, 5702, 5754, 6130, 6131, 6132, 6358, 6359, 6360, 8050, 8051, 8052, 8053, 8228, 8897,
 ];
 
-/// Metres per degree of latitude, for the size of cells and the text of errors.
+/// Metres per degree of latitude, for the size of cells and for error texts.
 const PER_DEGREE_M: f64 = 111_320.0;
 
-/// Tag of GDAL's metadata: XML with the scale, the offset and the unit of the values.
+/// Tag of GDAL's metadata: an XML text with scale, offset and unit of the values.
 const GDAL_METADATA: u16 = 42112;
 
 /// Coordinate system of a grid.
@@ -246,7 +246,7 @@ impl Terrain {
     }
 }
 
-/// Returns the bilinear interpolation of the grid's heights at a column and row.
+/// Returns the height at a column and row, by bilinear interpolation between grid points.
 ///
 /// `height` returns the height at a grid point.
 fn interpolated<E>(
@@ -578,7 +578,7 @@ fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
 
 /// Returns true if `value` is the scale 1, the offset 0 or the unit metre.
 ///
-/// The heights are then in metres.
+/// With these three, heights are in metres.
 fn is_metres(value: &str) -> bool {
     let is_number = [1.0, 0.0].map(Ok).contains(&value.parse::<f64>());
     is_number || ["m", "metre", "meter"].contains(&value.to_lowercase().as_str())

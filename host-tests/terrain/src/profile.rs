@@ -98,7 +98,7 @@ pub struct Clearance {
     pub state: State,
     /// Distance of the obstacle from the first antenna along the hop, m.
     pub along_m: f64,
-    /// Height of the line of sight above the obstacle, m; below 0 if the hop is blocked.
+    /// Height of the line of sight above the obstacle, m; negative if the hop is blocked.
     pub clearance_m: f64,
     /// Clearance that a clear hop needs at this obstacle, m.
     pub required_m: f64,
@@ -367,7 +367,7 @@ impl<'a> Ground<'a> {
         Ok([column + a * u + b * v, row + c * u + d * v])
     }
 
-    /// Returns the change of column and row per metre of x and of y, near a position.
+    /// Returns the changes of column and row per metre of x and per metre of y, near a position.
     fn turn(&self, [x, y]: [f64; 2]) -> Result<[[f64; 2]; 2], String> {
         let far_m = 0.5 * SQUARE_M;
         let around_m = f64::from(Axis::AROUND_M);

@@ -11,11 +11,11 @@ use crate::profile::{Ground, Node, Profile, State};
 /// Terrain below one hop.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct HopReport {
-    /// True if the ground is below the line of sight by 60 % of the first Fresnel zone's radius.
+    /// True if the ground is below the line of sight by at least 60 % of the first Fresnel zone's radius.
     pub clear: bool,
     /// State of the line of sight: `clear`, `grazing` or `blocked`.
     pub state: State,
-    /// Height of the line of sight above the worst obstacle, m; below 0 if the hop is blocked.
+    /// Height of the line of sight above the worst obstacle, m; negative if the hop is blocked.
     pub clearance_m: f64,
     /// Clearance that a clear hop needs at the worst obstacle, m.
     pub required_m: f64,
@@ -31,7 +31,7 @@ pub struct HopReport {
     pub diffraction_db: f64,
     /// SIR of the hop in the direction to Rx with its diffraction loss, dB.
     ///
-    /// The interference is computed without such a loss.
+    /// The interference is computed without diffraction loss.
     pub sir_db: f64,
     /// SIR of the hop in the direction to Tx with its diffraction loss, dB; absent if the SIR is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -32,7 +32,7 @@ struct Stretch {
     h_m: f64,
 }
 
-/// Highest and lowest ground along the line Tx-Rx: points of x, m, and height above the datum, m.
+/// Highest and lowest ground along the line Tx-Rx, as points of x, m, and height above the datum, m.
 ///
 /// Between two points the ground is no higher and no lower than at the points.
 struct Ridge {

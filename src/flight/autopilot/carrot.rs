@@ -60,7 +60,7 @@ const BEHIND_MS: u64 = 1_200;
 /// Near the setpoint the speed is k times the remaining distance.
 const HALVES_MS: u64 = 1_387;
 
-/// Maximum number of halvings of the speed that [`Pace::stopping_time`] counts. Eight of them reduce a remaining
+/// Maximum number of halvings of the speed that [`Pace::stopping_time`] counts. Eight halvings reduce a remaining
 /// distance of 20 m to less than [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
@@ -93,8 +93,8 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. The limit is 0.1 to 20, or 0 for the
-    /// default.
+    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. The speed limit is 0.1 to 20 m/s, or 0
+    /// for the default.
     pub fn of_speed(speed_m_s: f32) -> Self {
         let mut pace = Self::default();
         if speed_m_s > 0.0 {

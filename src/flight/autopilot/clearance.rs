@@ -30,7 +30,8 @@ const DENIED: u8 = 2;
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
-    /// True if more relays are lost on this side than a command can name. No command can then clear them.
+    /// True if more relays are lost on this side than a command can name. In this case no command can report them as
+    /// landed.
     is_full: bool,
 }
 
@@ -102,7 +103,7 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true until a received command is answered and the relay knows which relays have landed.
+    /// Returns true until a received command is answered, and this relay knows the landed relays.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }

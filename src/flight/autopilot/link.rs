@@ -325,22 +325,22 @@ impl Autopilot {
 
     /// Sets the time of flight with a full battery, s, and the speeds of return and descent, m/s.
     ///
-    /// Before the first call they are NaN, 5 and 1.5. With a time of NaN the battery's percentage gives no remaining
-    /// time. The speeds are clamped to 0.1 to 20. From the first call on, the link requests the battery messages of an
-    /// ArduCopter.
+    /// Before the first call these three values are NaN, 5 and 1.5. With a time of NaN the battery's percentage gives
+    /// no remaining time. The speeds are clamped to 0.1 to 20. From the first call on, the link requests the battery
+    /// messages of an ArduCopter.
     pub const fn set_endurance(&mut self, full_s: f32, return_m_s: f32, descent_m_s: f32) {
         let [level, down] = [return_m_s.clamp(0.1, 20.0), descent_m_s.clamp(0.1, 20.0)];
         self.vehicle.battery.setup = Some([full_s, level, down]);
     }
 
-    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`. `None`:
+    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`. `None` means
     /// unknown.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
-    /// Records whether the relay is ready to control the drone; initially true. While it is not, a PX4 in
-    /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD.
+    /// Records whether the relay is ready to control the drone; initially true. While the relay is not ready, a PX4 in
+    /// [`State::Standby`] receives no targets, so that the PX4 refuses OFFBOARD.
     ///
     /// Nothing else changes: a drone that the relay controls stays under control, and an ArduCopter accepts GUIDED in
     /// any case.
@@ -392,8 +392,9 @@ impl Autopilot {
 
     /// Processes an event of the relay, and sends the operator a text about events that matter in flight.
     ///
-    /// A new view (list of relays) is such an event once its positions are agreed on. The relay must control the drone
-    /// then, and the guard must not hold it back. [`handle_hold`](Self::handle_hold) reports why a drone is held back.
+    /// A new view (list of relays) is such an event once its positions are agreed on. In addition, the relay must
+    /// control the drone, and the guard must not hold the drone back. [`handle_hold`](Self::handle_hold) reports why a
+    /// drone is held back.
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {
@@ -809,8 +810,9 @@ impl Autopilot {
         self.parser.counters()
     }
 
-    /// Signs all frames with the key of `signing`, and accepts only frames signed with it. Only RADIO_STATUS of a
-    /// radio, which cannot sign, is accepted unsigned. A ground station sets the autopilot's key (SETUP_SIGNING).
+    /// Signs all frames with the key of `signing`, and accepts only frames signed with it. Of unsigned frames, only
+    /// RADIO_STATUS of a radio is accepted, because a radio cannot sign. A ground station sets the autopilot's key
+    /// (SETUP_SIGNING).
     #[cfg(feature = "mavlink-signing")]
     pub const fn sign(&mut self, signing: Signing) {
         self.trust.sign_with(signing);

@@ -210,7 +210,7 @@ impl Report {
         self.recent.iter().all(|(of, _)| *of != hash) && self.recent.push((hash, until)).is_ok()
     }
 
-    /// Removes the line at index `at`. Unlike `Vec::remove` it does not panic without such a line.
+    /// Removes the line at index `at`. Unlike `Vec::remove`, the function does not panic if there is no such line.
     fn remove_line(&mut self, at: usize) {
         let mut index = 0;
         self.lines.retain(|_| {
@@ -327,8 +327,8 @@ pub enum AutopilotEvent {
     Restarted,
     /// Change of the control state of the drone: see [`State`].
     State(State),
-    /// The relay has lost control of the drone. Comes together with [`State::Standby`], or up to 1.3 s later if the
-    /// cause is possibly a geofence.
+    /// The relay has lost control of the drone. This event comes together with [`State::Standby`], or up to 1.3 s later
+    /// if the cause is possibly a geofence.
     Released(Release),
     /// Reason why the relay cannot control the drone now.
     ///
@@ -346,8 +346,8 @@ pub enum AutopilotEvent {
     FenceBreached,
     /// The drone is so far from the line Tx to Rx that it has no position in the mission's coordinates.
     ///
-    /// Check that the configured positions of Tx and Rx belong to this flight. Reported once on the ground, and at most
-    /// once in 10 s in the air.
+    /// Check that the configured positions of Tx and Rx belong to this flight. The event is raised once on the ground,
+    /// and at most once in 10 s in the air.
     OffLine(OffLine),
     /// The link accepted an operator's command that reports the lost relays of one side as landed.
     ///
@@ -363,7 +363,7 @@ pub enum AutopilotEvent {
     },
     /// The link denied an operator's command that reports lost relays as landed.
     ///
-    /// Its numbers are not exactly those of all lost relays of one side.
+    /// The numbers in the command are not exactly those of all lost relays of one side.
     ClearRefused {
         /// Numbers of the relays in the command, padded with zeros.
         relays: [u16; MOST],

@@ -32,7 +32,7 @@ pub enum State {
     Standby,
     /// The relay controls the drone, which flies to the relay's setpoint.
     Engaged,
-    /// The relay controls the drone, but its position is unknown: the autopilot keeps the last target.
+    /// The relay controls the drone, but the drone's position is unknown. The autopilot keeps the last target.
     Blind,
 }
 
@@ -82,8 +82,8 @@ impl State {
     }
 }
 
-/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. Other vehicles use the same mode numbers for other
-/// modes.
+/// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. Vehicles of other types use the same mode numbers for
+/// different modes.
 const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 
 /// Kind of autopilot firmware: PX4 or ArduCopter.

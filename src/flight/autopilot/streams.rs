@@ -177,7 +177,7 @@ impl Streams {
 
     /// Returns the next message to request, and its interval in µs; `None` if no request is due.
     ///
-    /// Battery messages are requested only if `counts` is true.
+    /// Battery messages are requested only if the endurance is computed (`counts` is true).
     pub(super) fn take(&mut self, now: Instant, kind: Kind, counts: bool) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.outstanding {
             if now.since(at) < ANSWER {

@@ -55,8 +55,8 @@ impl From<Flaw> for Mistrust {
 pub(super) struct Trust {
     signing: Option<Signing>,
     refused: u32,
-    /// Signature mismatch of the last heartbeats, and their number in a row. `None` if the last heartbeat had no
-    /// mismatch.
+    /// Signature mismatch of the last heartbeats, and the number of heartbeats in a row with it. `None` if the last
+    /// heartbeat had no mismatch.
     row: Option<(Mistrust, u8)>,
     /// Bit mask of the kinds of mismatch that must be reported.
     due: u8,

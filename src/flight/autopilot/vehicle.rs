@@ -97,7 +97,8 @@ pub(super) struct Vehicle {
     granted: bool,
     /// Value of `MAV_STATE` in the autopilot's last heartbeat.
     status: u8,
-    /// True if the present or next OFFBOARD or GUIDED counts as the pilot's choice. See [`Self::review_choice`].
+    /// True if the mode OFFBOARD or GUIDED, present or next, counts as chosen by the pilot. See
+    /// [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
@@ -414,7 +415,7 @@ impl Vehicle {
 
     /// Returns the time of the next change without a new message; `None` if there is none.
     ///
-    /// The change is that a received value becomes too old, or that a TIMESYNC request is due.
+    /// At that time a received value becomes too old, or a TIMESYNC request is due.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -717,7 +718,7 @@ const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 pub struct OffLine {
     /// Position of the drone as reported by the autopilot.
     pub at: Geodetic,
-    /// Distance along the ground from the nearest point of the line Tx to Rx, m.
+    /// Distance of the drone along the ground from the nearest point of the line Tx to Rx, m.
     pub away_m: u32,
 }
 
@@ -769,7 +770,7 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone is near the line Tx to Rx. The next time it is far from the line on the ground is
+    /// Records that the drone is near the line Tx to Rx. The next position on the ground that is far from the line is
     /// reported again.
     pub(super) const fn returned(&mut self) {
         self.newest = None;

@@ -48,7 +48,8 @@ pub struct Address {
     pub component: u8,
 }
 
-/// Returns the checksum of a frame. `covered` are its bytes after the start byte. `known` has the message's CRC seed.
+/// Returns the checksum of a frame. `covered` are the bytes of the frame after its start byte. `known` has the
+/// message's CRC seed.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);

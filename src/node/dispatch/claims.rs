@@ -102,7 +102,7 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if all authentication sessions must be restarted; otherwise `None`.
+    /// Returns the new claim number if all authentication sessions must restart with it; otherwise `None`.
     ///
     /// The new sessions count their nonces from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
@@ -113,7 +113,7 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns the renewal's number if `message` belongs to a lease renewal and a handshake must follow it.
+    /// Returns the renewal's number if `message` is part of a lease renewal and a handshake must follow.
     ///
     /// `None` if `message` requires no handshake. On a shared channel one message of each lease renewal requires a
     /// handshake. By this handshake another node with the same number detects this relay, even if the chain sends no
@@ -138,7 +138,7 @@ impl Node {
         self.duplicate.is_passive()
     }
 
-    /// Handles the report that the other node with this relay's node number has been removed.
+    /// Handles the operator's report that the duplicate of this relay's node number has been removed.
     pub(crate) fn clear_duplicate(&mut self, now: Instant) {
         if self.duplicate.clear(now, &self.member.settings) {
             self.become_active(now);

@@ -23,7 +23,7 @@ struct MissionState {
 }
 
 impl Node {
-    /// Schedules a hello to node `to` at `side`. If `ask` is true, it requests a hello in return.
+    /// Schedules a hello to node `to` at `side`. If `ask` is true, the hello requests a hello in return.
     #[inline(never)] // called from many places
     pub(super) fn schedule_hello(&mut self, side: Side, to: u16, ask: bool) {
         let distance = to.abs_diff(self.member.node);
@@ -295,8 +295,8 @@ impl Node {
         }
     }
 
-    /// Records whether the neighbour at `side` has selected this relay (`mutual`). If it has just done so, unanswered
-    /// messages are retransmitted.
+    /// Records whether the neighbour at `side` has selected this relay (`mutual`). If it has just selected this relay,
+    /// unanswered messages are retransmitted.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

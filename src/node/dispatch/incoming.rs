@@ -294,8 +294,8 @@ impl Node {
         Side::back(self.member.mission.heading())
     }
 
-    /// Returns the side of node `sender`. `None` unless it is a neighbour, a possible neighbour, or a ground station
-    /// that may upload missions.
+    /// Returns the side of node `sender`. `None` unless `sender` is a neighbour, a possible neighbour, or a ground
+    /// station that may upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
@@ -312,7 +312,7 @@ impl Node {
         })
     }
 
-    /// Returns the side of `node` if it is a ground station that this relay listens to; otherwise `None`.
+    /// Returns the side of `node` if this relay accepts messages of this ground station; otherwise `None`.
     pub(super) fn ground_side(&self, node: u16) -> Option<Side> {
         let (own, all) = (self.member.node, self.member.all);
         let most = match self.member.settings.wiring {

@@ -320,7 +320,8 @@ impl Node {
         }
     }
 
-    /// Restarts the search for the best target SIR. Has an effect only at the leader and outside of a view change.
+    /// Restarts the search for the best target SIR. The call has an effect only at the leader, and not during a view
+    /// change.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
         let is_in = !self.is_passive() && !self.layers.leaving.is_outside();

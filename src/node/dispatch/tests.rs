@@ -36,7 +36,7 @@ pub(super) fn upload_to(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Test helper: returns relay 2 of a chain of 3, with signed frames if `signs` is true.
+/// Test helper: returns relay 2 of a chain of 3, which signs its frames if `signs` is true.
 pub(super) fn relay(signs: bool) -> Node {
     relay_of(base(), 2, signs)
 }
@@ -438,7 +438,7 @@ fn a_loss_and_a_mission_mismatch_name_the_node() {
     }
 }
 
-/// Checks that a spare, which waits outside of the chain, requests no view until it joins.
+/// Checks that a spare, which waits outside of the chain, requests no view before it joins.
 #[test]
 #[cfg(feature = "departures")]
 fn a_relay_outside_proposes_nothing() {

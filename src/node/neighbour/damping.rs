@@ -242,14 +242,14 @@ impl Damping {
         }
     }
 
-    /// Returns true while the link to the node `distance` relays away must not be used because it flaps.
+    /// Returns true while the link to the node `distance` relays away flaps and must not be used.
     pub(super) fn is_held_down(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let link = self.link(distance);
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if a link on this side is lost repeatedly at long intervals. The next loss of such a link should be
-    /// detected early.
+    /// Returns true if any link on this side has been lost repeatedly, at long intervals. The next loss of such a link
+    /// should be detected early.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -264,7 +264,7 @@ impl Damping {
         self.link(distance).is_some_and(|link| link.was_down)
     }
 
-    /// Returns a bit mask of the nodes whose links must not be used because they flap. Bit 0 is the nearest node.
+    /// Returns a bit mask of the nodes whose links flap and must not be used. Bit 0 is the nearest node.
     pub(super) fn held_down_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
             .filter(|distance| self.is_held_down(*distance, now, settings))
@@ -313,7 +313,7 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// Returns the initial state of a test: links without losses, the time 1 000 s, and default settings.
+    /// Returns the initial state for a test: links without losses, the time 1 000 s, and default settings.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())

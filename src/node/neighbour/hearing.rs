@@ -49,7 +49,7 @@ pub(super) struct Hearing {
 
 /// Nodes on one side whose mission or key was refused in the last one to two minutes.
 ///
-/// Bits 0 to 3 are the nodes with another mission, and bits 4 to 7 those with another key, the nearest node first.
+/// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with a wrong key; the nearest node is first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refusals {
     since: Instant,
@@ -172,7 +172,7 @@ pub(super) struct Hellos {
 impl Hellos {
     pub(super) const NONE: Self = Self { due: 0, reply: 0 };
 
-    /// Schedules a hello to the node `distance` relays away. If `ask` is true, it requests an answer.
+    /// Schedules a hello to the node `distance` relays away. If `ask` is true, the hello requests an answer.
     pub(super) const fn schedule(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
         self.due |= bit;

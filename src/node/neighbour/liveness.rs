@@ -170,7 +170,8 @@ impl Liveness {
         self.lost && !self.was_received
     }
 
-    /// Returns the longest silence that lost frames alone can cause, counted as requests lost every `tick`.
+    /// Returns the longest silence that lost frames alone can cause. ¶ The time between two heartbeat requests is
+    /// `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }

@@ -90,8 +90,8 @@ impl Neighbours {
 
     /// Returns the next pending heartbeat; `None` if none is pending.
     ///
-    /// The values are: side, destination node, number of this relay's request, and number of the neighbour's request
-    /// that is answered. A number 0 means none.
+    /// The values are: side, destination node, number of this relay's own request, and number of the neighbour's
+    /// request to which the heartbeat replies. A number 0 means none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

@@ -80,7 +80,7 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side that have recently reported to receive this relay.
     pub(super) two_way: Hearing,
-    /// Node that each of the four nearest nodes on this side has as its neighbour toward this relay; 0 for none.
+    /// Selected neighbour, toward this relay, of each of the four nearest nodes on this side; 0 for none.
     ///
     /// The entry of the nearest node is the first.
     pub(super) selection: [u16; CANDIDATES as usize],
@@ -140,7 +140,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts this side at `now`. The mission configures `node` as the neighbour; 0 for none.
+    /// Starts this side at `now`. `node` is the neighbour configured in the mission; 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -256,7 +256,7 @@ impl Neighbour {
         excused
     }
 
-    /// Returns true if the neighbour's silence must be checked, or the search's next hellos must be sent.
+    /// Returns true if a check of the neighbour's silence or the next hellos of the search are due.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.check_at.is_some_and(|at| at <= now)
     }
@@ -373,8 +373,8 @@ impl Neighbour {
         }
     }
 
-    /// Gives up the selected neighbour. If `ends` is true, no search follows, because the chain ends here or this relay
-    /// leaves it.
+    /// Gives up the selected neighbour. If `ends` is true, no search follows, because the chain ends at this relay, or
+    /// this relay leaves the chain.
     pub(crate) fn give_up(&mut self, now: Instant, ends: bool) {
         self.search(now);
         self.heartbeat = PendingHeartbeat::NONE;
@@ -749,7 +749,7 @@ impl Neighbour {
 }
 
 impl Neighbour {
-    /// Records the number of the neighbour's heartbeat request; 0 for none. The next heartbeat answers it.
+    /// Records the number of the neighbour's heartbeat request; 0 for none. The next heartbeat answers this request.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.heartbeat.reply = number;
@@ -764,8 +764,8 @@ impl Neighbour {
 
     /// Returns the pending heartbeat; `None` if none is pending.
     ///
-    /// The values are: destination node, number of this relay's request, and number of the neighbour's request that is
-    /// answered. A number 0 means none.
+    /// The values are: destination node, number of this relay's own request, and number of the neighbour's request to
+    /// which the heartbeat replies. A number 0 means none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {
@@ -779,7 +779,7 @@ impl Neighbour {
         Some((self.node, number, reply))
     }
 
-    /// Schedules a hello to the node `distance` relays away. If `ask` is true, it requests an answer.
+    /// Schedules a hello to the node `distance` relays away. If `ask` is true, the hello requests an answer.
     pub(crate) const fn schedule_hello(&mut self, distance: u16, ask: bool) {
         self.hellos.schedule(distance, ask);
     }

@@ -47,7 +47,7 @@ pub(super) struct JointPlace {
     pub(super) plain: bool,
 }
 
-/// Time slots of this relay, each as long as its hop needs. Unused if all slots are equal.
+/// Time slots of this relay, each as long as its hop needs. Unused if all slots have the same length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
     /// This relay's x in the joint solution, m, and its slots at this x, as fractions of the frame. `None` without a
@@ -333,7 +333,7 @@ impl Computation {
     }
 
     /// Returns this relay's lateral offset, altitude and power for trying target SIRs. If `chosen` is true, offset and
-    /// altitude are those of the joint method, otherwise the configured ones.
+    /// altitude are those of the joint method; otherwise they are those configured.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -370,7 +370,8 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 pub(crate) enum LeaderTask {
     /// No task: this relay is not the leader, has not started, or has finished.
     Idle,
-    /// Prediction of the target SIR from the mission. The first targets to try are around it.
+    /// Prediction of the target SIR from the mission. The first targets that the chain tries are near the predicted
+    /// one.
     Predicting(Planner),
     /// Solution of the whole chain by the joint method. Every relay computes it.
     Solving(ChainSolver),
@@ -660,7 +661,7 @@ pub(crate) struct TurnPass {
     pub(crate) turn: AdjustStep,
     /// SIR of the chain's worst hop before this pass of the token, linear.
     pub(crate) sir: f32,
-    /// Position and power of the previous relay, the start of the hop to this relay; `None` for Tx.
+    /// Position and power of the previous relay, which sends to this relay; `None` if Tx is the sender.
     pub(super) before: Option<HopEnd>,
     search: Option<LocalSearch>,
     /// True if this relay, or a relay that had the token after it, has moved in this pass.
@@ -692,7 +693,7 @@ impl TurnPass {
 
     /// Continues the search: evaluates `budget` positions, and then the rest of the last grid row.
     ///
-    /// Returns `Ready` at the end of the search, with the better position, or with `None` if there is none.
+    /// Returns `Ready` at the end of the search, with a better position, or with `None` if none was found.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);
@@ -713,7 +714,7 @@ impl TurnPass {
 /// Altitudes and transmit powers of the view's relays, as far as they are known.
 #[derive(Clone, Debug)]
 pub(super) struct Seats {
-    /// Number of relays whose profiles are known, counted from Tx. `None` before the first collection of profiles.
+    /// Number of relays, from Tx on, whose profiles are known. `None` before the first collection of profiles.
     pub(super) known: Option<u16>,
     /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it. The power is 0 if the relay
     /// has the power and altitude of the mission's common profile.

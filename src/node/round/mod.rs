@@ -391,7 +391,7 @@ impl Computation {
         }
     }
 
-    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, and an
+    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, or an
     /// error if no target SIR is feasible.
     fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
         if self.must_distribute(context) || self.must_gather(context) {

@@ -64,7 +64,7 @@ pub(crate) enum Action {
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view, because this relay cannot take part in the leader's pass along the chain.
+    /// Request a new view, because this relay cannot take part in the leader's present pass.
     Foreign,
 }
 
@@ -185,8 +185,8 @@ impl RoundState {
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a received message by the `number` of its pass along the chain. `same` is true if its content equals
-    /// that of the current pass.
+    /// Classifies a received message by the `number` of its pass along the chain. `same` is true if the message has the
+    /// same content as that of the current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
             // A relay that has missed the first pass cannot join later ones, and requests a new view.
@@ -226,8 +226,8 @@ impl RoundState {
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass along the chain has started since the earlier state `before`. In that state the
-    /// result of the last pass was known.
+    /// Returns true if a new pass along the chain has started since the earlier state `before`. `before` must be a
+    /// state in which the result of the last pass was known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }

@@ -13,10 +13,10 @@ use crate::wire::message::{AdjustStep, Moved, Token};
 use core::task::Poll;
 
 /// Number of positions that one call of [`Computation::continue_turn`] evaluates in Algorithm 2. The first value is for
-/// traffic from Tx to Rx only, the second for both directions.
+/// traffic from Tx to Rx only, the second for traffic also back to Tx.
 ///
-/// A call also completes the current altitude of the search grid: at most 24 more positions, or 194 for both
-/// directions.
+/// A call also completes the current altitude of the search grid: at most 24 more positions, or 194 for traffic also
+/// back to Tx.
 const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 fn neighbour(context: &Context<'_>, place: Placement, power_w: f32) -> HopEnd {

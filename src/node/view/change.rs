@@ -47,8 +47,8 @@ pub(crate) struct ViewChange {
 }
 
 impl ViewChange {
-    /// Creates the state of view changes for a chain of `relays` relays. `initial_leader` is the leader before any view
-    /// change.
+    /// Creates the state of view changes for a chain of `relays` relays. `initial_leader` is the node number of the
+    /// leader before any view change.
     pub(crate) const fn new(relays: u16, initial_leader: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, initial_leader),
@@ -113,8 +113,8 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members of `view` have accepted it. No effect if `view` is not the last view accepted by this
-    /// relay.
+    /// Records that all members of `view` have accepted it. The call has no effect if this relay has accepted a
+    /// different view last.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -138,7 +138,7 @@ impl ViewChange {
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
     }
 
-    /// Returns true if the last proposal was refused, because too few relays can be reached for a quorum.
+    /// Returns true if the last proposal was refused, because the reachable relays are no quorum.
     pub(crate) const fn has_no_quorum(&self) -> bool {
         self.refused
     }
@@ -513,7 +513,7 @@ pub(crate) struct Proposed {
     /// Node to which the proposal was forwarded; `None` until then. The proposal is never sent to a second node,
     /// because two views with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decided view replaces. Before the decision: the newest view known to be agreed on.
+    /// View that the decided view replaces. Before the decision it is the newest view known to be agreed on.
     pub(crate) base: View,
     /// Number of relays that the proposal has reached; 0 until its decision is known.
     pub(super) reached: u16,

@@ -59,7 +59,7 @@ pub(crate) struct Electorate {
     pub(super) accepted: Option<Successor>,
     /// Proposals that this relay has voted on and that can still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
-    /// Node number of the leader before any view change. If the initial view splits into halves, the half with this
+    /// Node number of the leader before any view change. If the initial view splits into two halves, the half with this
     /// node has the quorum.
     pub(super) initial_leader: u16,
 }
@@ -142,7 +142,8 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of node `node` alone is not enough for a quorum on `proposal`. Does not vote.
+    /// Returns true if the vote of node `node` alone is not enough for a quorum on `proposal`. This relay does not vote
+    /// by the call.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -184,8 +185,8 @@ impl Electorate {
         self.voted = kept;
     }
 
-    /// Accepts the decision on `proposal`; returns false if a later proposal was promised. `view` is the decided view,
-    /// which replaces `base`; `None` for a refusal.
+    /// Accepts the decision on `proposal`; returns false if this relay has promised a later proposal. `view` is the
+    /// decided view, which replaces `base`; `None` for a refusal.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;

@@ -48,7 +48,8 @@ use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 /// Checks the view change for every order of events in a chain of `relays` relays. The numbers of link cuts,
 /// proposals and reboots are limited.
 ///
-/// `heals` also checks in every state that the chain agrees on a view once all links are restored.
+/// If `heals` is true, the check in every state also includes that the chain agrees on a view once all links are
+/// restored.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,
@@ -263,7 +264,7 @@ impl Chain {
         (at + 1..self.parts.len()).find(|&other| self.are_linked(at, other))
     }
 
-    /// Returns true if two relays are both inside of the chain and their link is not cut.
+    /// Returns true if both relays are inside of the chain, and the link between them is not cut.
     fn are_linked(&self, one: usize, other: usize) -> bool {
         self.parts[other] == self.parts[one] && self.outside & (1 << one | 1 << other) == 0
     }

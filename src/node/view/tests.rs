@@ -304,8 +304,8 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Checks that a refusal names the agreed view, so that relays near the leader learn of it. Otherwise their proposals
-/// would be refused for ever.
+/// Checks that a refusal names the agreed view, so that relays near the leader learn of it. Otherwise the proposals of
+/// these relays would be refused for ever.
 #[test]
 fn a_refusal_names_the_agreed_view() {
     let view = View {

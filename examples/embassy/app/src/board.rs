@@ -17,7 +17,7 @@ pub struct Board<F> {
     pub reset: Reset,
     /// Flash for state that survives a reboot; `None` if the board has none.
     ///
-    /// Without it a block with a signing key is refused, and the relay's votes are lost at a reboot.
+    /// Without such flash, a block with a signing key is refused, and the relay's votes are lost at a reboot.
     pub storage: Option<Storage<F>>,
 }
 
@@ -34,7 +34,7 @@ pub struct Storage<F> {
     pub epochs: [Range<u32>; 2],
     /// Offsets of the two sectors for the relay's votes on the chain's membership.
     ///
-    /// When both are full, one is erased in flight. Small sectors take less time.
+    /// When both sectors are full, one is erased in flight. The erase of a small sector takes less time.
     pub views: [Range<u32>; 2],
 }
 

@@ -96,7 +96,7 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
 
 /// Feeds the watchdog every [`TURN`], forever, unless the relay's timers are late. See [`watchdog::may_feed`].
 ///
-/// It runs in the task of the ports and timers. If that task hangs, panics or faults, the feeding stops.
+/// This future runs in the task of the ports and timers. If that task hangs, panics or faults, the feeding stops.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     loop {
         let now = EmbassyClock.now().as_micros();

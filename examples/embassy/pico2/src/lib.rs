@@ -43,7 +43,7 @@ const FLASH_SIZE: usize = 4 * 1024 * 1024;
 /// Flash driver of the board.
 pub type BoardFlash = Flash<'static, FLASH, Blocking, FLASH_SIZE>;
 
-/// Running watchdog of the board, with a timeout of 6 s. A debugger that halts the core pauses it.
+/// Running watchdog of the board, with a timeout of 6 s. A debugger that halts the core pauses the watchdog.
 pub struct Guard(Watchdog);
 
 impl Guard {

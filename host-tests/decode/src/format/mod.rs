@@ -38,7 +38,7 @@ pub enum Kind {
     Array(usize, Box<Kind>),
     /// Optional item: byte 00 for none, or byte 01 and the item.
     Option(Box<Kind>),
-    /// List of items of one type: a varint count, at most the given number, and the items.
+    /// List of items of one type: a varint count, at most the number in this variant, and the items.
     List(u64, Box<Kind>),
     /// Group of consecutive fields.
     Group(Vec<Field>),

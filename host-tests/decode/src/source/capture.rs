@@ -133,7 +133,7 @@ fn pieces<E>(
 
 /// Converts a packet's timestamp to the time since 1970. `resolution` is that of its interface.
 ///
-/// The capture library, which returns `read`, ignores the resolution: it takes every unit for a nanosecond.
+/// The capture library, which returns `read`, ignores the resolution: it assumes nanoseconds.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

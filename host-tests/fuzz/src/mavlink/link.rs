@@ -236,7 +236,7 @@ impl Link {
         }
     }
 
-    /// Delivers a heartbeat to the link, from a PX4, an ArduCopter or another system, in any flight mode.
+    /// Delivers a heartbeat to the link, from a PX4, an ArduCopter or any other system, in any flight mode.
     fn heartbeat(&mut self, input: &mut Input<'_>) {
         let autopilot = match input.below(8) {
             0..=3 => 12,

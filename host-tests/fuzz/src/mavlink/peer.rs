@@ -242,7 +242,7 @@ fn read(bytes: &[u8]) -> u64 {
 
 /// Signs `frame` with link number `link` and timestamp `stamp`.
 ///
-/// The checksum covers the flag of a signed frame, so it is computed anew.
+/// The checksum covers the flag of a signed frame, so the checksum is computed anew.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.truncate(frame.len() - 2);

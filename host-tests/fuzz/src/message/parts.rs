@@ -22,9 +22,9 @@ pub struct RelayState {
     pub number: u16,
     /// Session number in the relay's last fence (message of the collision guard); 0 for none.
     ///
-    /// The relay draws it at random for the session with this neighbour.
+    /// The relay draws this number at random for the session with this neighbour.
     pub association: u16,
-    /// Number in the relay's last hello; 0 for none. A mission offer must repeat it.
+    /// Number in the relay's last hello; 0 for none. A mission offer must repeat this number.
     pub offer_number: u16,
     /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
@@ -201,7 +201,7 @@ impl Body<'_, '_> {
 
     /// Appends the number of a lease renewal, mostly small, and a digest.
     ///
-    /// It is the digest of mission and view (membership of the chain), rarely a wrong one.
+    /// The digest is that of mission and view (membership of the chain), rarely a wrong one.
     pub(super) fn pulse_number(&mut self) {
         self.request_number();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -248,7 +248,7 @@ impl Body<'_, '_> {
 
 /// Returns the 16-bit digest of a view, which messages add to the mission's digest.
 ///
-/// It is the lower half of the view's name plus the byte-swapped upper half.
+/// The digest is the lower half of the view's name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

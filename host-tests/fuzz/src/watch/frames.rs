@@ -41,7 +41,7 @@ impl Frames {
         }
     }
 
-    /// Checks a frame: it must be valid, from this relay, and to a neighbour at `port`.
+    /// Checks a frame: the frame must be valid, from this relay, and to a neighbour at `port`.
     pub(super) fn look(&mut self, relay: &Relay, settings: &Settings, port: Port, bytes: &[u8]) {
         let mut deframer = Deframer::new();
         let mut frames = 0;

@@ -61,7 +61,7 @@ fn heights_are_interpolated_within_and_between_files() {
     assert!((srtm.height_m(48.0, 9.0).unwrap() - plane(9.0, 48.0)).abs() < 0.01);
 }
 
-/// Converts to UTM coordinates by Krüger's series to the third order, independent of the crate.
+/// Converts to UTM coordinates by Krüger's series to the third order, independently of the crate.
 pub(crate) fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
     let n: f64 = 1.0 / (2.0 * 298.257_223_563 - 1.0);
     let alpha = [

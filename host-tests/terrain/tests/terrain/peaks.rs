@@ -24,7 +24,7 @@ const WAVE_M: f64 = 0.125;
 
 /// Plain with narrow peaks, each of a single grid point.
 ///
-/// Its surface is computed here, independently of the planner.
+/// The surface of the plain is computed here, independently of the planner.
 struct Peaks {
     corner: [f64; 2],
     cell: [f64; 2],

@@ -229,8 +229,8 @@ fn the_next_proposal_spreads_the_agreed_view() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Checks that a relay that does not know the newest view has no vote. Relay 2 does not know it and votes first. Relay
-/// 3 knows it and votes later.
+/// Checks that a relay that does not know the newest view has no vote. Relay 2 does not know the view and votes first.
+/// Relay 3 knows the view and votes later.
 #[test]
 fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);

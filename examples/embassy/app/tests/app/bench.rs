@@ -315,7 +315,8 @@ impl Bench {
         self.drone = None;
     }
 
-    /// Lets the drone's UART hang: each poll of its driver takes `millis` ms and sends nothing. 0 ends this.
+    /// Lets the drone's UART hang: each poll of its driver takes `millis` ms and sends nothing. With 0 the UART works
+    /// again.
     pub(crate) fn stall_uart(&mut self, millis: u64) {
         self.wire[0].stall_ms.set(millis);
     }

@@ -23,7 +23,7 @@ fn promised(record: &ViewRecord) -> u32 {
 
 /// Checks that a relay restarted three times never votes for an older view.
 ///
-/// The promised view number must never fall.
+/// That is, the promised view number must never decrease.
 ///
 /// The other two relays fly on and readmit it.
 #[test]

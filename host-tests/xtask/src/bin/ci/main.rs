@@ -121,7 +121,7 @@ fn run<'a>(
     failure.map(|evidence| (&**name, evidence))
 }
 
-/// Number of last output lines repeated at the end for a failed step without tests.
+/// Number of output lines that are repeated at the end for a failed step without tests: the last ones.
 const LAST_LINES: usize = 20;
 
 /// Maximum number of lines repeated from a list of failures, either panics or names of failed tests.
@@ -132,7 +132,7 @@ const LINES_OF_FAILURES: usize = 100;
 pub(crate) struct Evidence {
     failures: Vec<String>,
     last: VecDeque<String>,
-    /// Number of lines still to keep of the present list of failures; `None` outside a list.
+    /// Number of lines still to keep of the present list of failures; `None` outside of such a list.
     remaining: Option<usize>,
 }
 

@@ -13,7 +13,7 @@ const OF_DEBIAN: [&str; 3] = ["qemu-system-arm", "tshark", "chromium"];
 
 /// Component or target of the Rust toolchain that the steps need.
 ///
-/// Name, command that succeeds if it is installed, and rustup arguments that add it.
+/// The fields are its name, a command that succeeds if it is installed, and the rustup arguments that install it.
 type Needed = (
     &'static str,
     &'static [&'static str],
@@ -80,7 +80,7 @@ const FOR_THE_REST: [Needed; 5] = [
 /// Version of cargo-fuzz to install.
 const CARGO_FUZZ_VERSION: &str = "0.13.2";
 
-/// Installs the missing tools, only those of the quick steps if `quick` is true.
+/// Installs the missing tools, or only those that the quick steps need if `quick` is true.
 ///
 /// # Errors
 /// The command to type for a tool that cannot be installed.

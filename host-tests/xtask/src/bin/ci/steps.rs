@@ -66,7 +66,7 @@ pub(crate) enum Lane {
 
 /// Nightly compiler for the fuzzer and for Miri.
 ///
-/// Its date is fixed, so that a commit always has the same result.
+/// The date of the compiler is fixed, so that a commit always has the same result.
 pub(crate) const NIGHTLY: &str = "nightly-2026-10-30";
 
 /// Path of cargo-fuzz, which [`super::prepare`] installs.
@@ -214,7 +214,7 @@ const WAITING_TEST: &str = "companion";
 
 /// Number of tests of [`WAITING_TEST`] that run at a time.
 ///
-/// It may exceed the number of cores: each test uses a few per cent of a core.
+/// The number may exceed that of the cores, because each test uses a few per cent of a core.
 const WAITING_TESTS: &str = "6";
 
 /// Returns the steps that run all tests of the workspace.

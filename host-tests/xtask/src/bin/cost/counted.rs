@@ -416,7 +416,7 @@ const COUNTED: &[Counted] = &[
 
 /// Table rows for conversions between latitude, longitude and positions on the line Tx-Rx.
 ///
-/// The image of the runners measures them.
+/// The same image that measures the runners measures these conversions.
 const FLOWN: &[Counted] = &[
     (
         "conversion set-up for the line between two sites",

@@ -39,7 +39,7 @@ pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
 
 /// Measured image: description, example, cargo options, and budgets in bytes.
 ///
-/// The budgets are for flash, static RAM and stack.
+/// The budgets are those for flash, static RAM and stack.
 type Image = (
     &'static str,
     &'static str,
@@ -250,7 +250,8 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Proves that no relay image can panic: each links with a panic handler that cannot be linked.
+/// Proves that no relay image can panic. ¶ Each image links with a panic handler that would make the link fail if it
+/// were used.
 ///
 /// To test the proof, an image with a deliberate panic must fail to link.
 pub(crate) fn no_panic() -> Result<(), String> {

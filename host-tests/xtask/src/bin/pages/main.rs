@@ -184,7 +184,7 @@ fn own_command(line: &str) -> Option<String> {
     with_alias(first.rsplit('/').next()?, rest)
 }
 
-/// Adds `--dry-run` to a command that would ask for a confirmation, as there is no terminal.
+/// Adds `--dry-run` to a command that would ask for a confirmation, because there is no terminal.
 fn confirmed(command: String) -> String {
     let asks = command.starts_with("cargo ground ") && command.contains(" --version ");
     if asks && !command.contains(" --yes") {

@@ -26,7 +26,7 @@ pub(crate) struct Block {
     /// Number of headings before this block.
     heading: usize,
     pub(crate) kind: Kind,
-    /// True for a block `console`: lines with `$ ` are commands, the others are output.
+    /// True for a block `console`: lines with `$ ` are commands, all other lines are output.
     is_console: bool,
     /// True if numbers in the output may differ from the page.
     pub(crate) noisy: bool,
