@@ -20,7 +20,7 @@ use crate::site::degrees;
 /// Settings of the `--config` file that have no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
-    /// Path-loss parameters of the file; `None` for the default channel, that of the paper.
+    /// Path-loss parameters of the file; `None` for the default, the paper's channel.
     pub channel: Option<Channel>,
     /// Interference along x in the file, if any.
     pub field: Option<Interference>,

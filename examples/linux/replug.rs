@@ -65,7 +65,7 @@ impl Replug {
         self.tap = Some(tap);
     }
 
-    /// If there is a capture, adds a comment about an operator's command to its next frame.
+    /// Adds a comment about an operator's command to the next frame of the capture, if there is one.
     pub fn note(&mut self, note: &str) {
         if let Some(tap) = &mut self.tap {
             tap.note(note);

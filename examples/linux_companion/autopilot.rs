@@ -253,7 +253,7 @@ impl Companion {
         }
     }
 
-    /// If no autopilot has been found since the start, logs this once for each kind of received data.
+    /// Logs, once for each kind of received data, that no autopilot has been found since the start.
     fn log_unanswered(&mut self, now: Instant, log: &Log) {
         let received = self.received_kind();
         if let Some(missing) = self.answers.check(now, received) {

@@ -97,7 +97,9 @@ impl Positions {
     }
 }
 
-/// Logs whether the guard keeps drones apart in flight. It does so only with `positions`.
+/// Logs, for a relay without an autopilot, whether the guard keeps drones apart in flight.
+///
+/// Without `positions` the guard is off.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {

@@ -2,8 +2,8 @@
 //!
 //! Wiring, drone and log are the same.
 //!
-//! It is for comparison with the polled one (`cargo cost`), and for the emulator (`cargo test --test qemu`). Embassy
-//! would wait forever for a clock that QEMU lacks. For your own board begin with `examples/embassy`. It has no
+//! This image is for comparison with the polled image (`cargo cost`), and for the emulator (`cargo test --test qemu`).
+//! Embassy would wait forever for a clock that QEMU lacks. For your own board begin with `examples/embassy`. It has no
 //! autopilot link: a drone whose block has Tx and Rx positions does not join the chain.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

@@ -177,7 +177,7 @@ async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// Signal that one future raises and another one waits for.
+/// Signal that one future raises, and for which a second future waits.
 struct Signal {
     is_raised: Cell<bool>,
     waker: Cell<Option<Waker>>,

@@ -306,7 +306,7 @@ impl Circulation {
     }
 }
 
-/// After this number of consecutive messages with old sequence numbers, the leader has restarted.
+/// Number of consecutive messages with old sequence numbers after which the leader counts as restarted.
 pub(crate) const SUSPICIOUS: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,8 @@
-//! Duplicate index: another node uses this relay's node number. At most one of the two may have a setpoint.
+//! Duplicate index: a second node uses this relay's node number. At most one of the two nodes may have a setpoint.
 //!
 //! Each start has a 30-bit *claim number*, drawn from the seed of `Relay::new`. Two nodes with one number compare their
-//! claims. The larger epoch makes the larger claim. With equal epochs it is the larger claim number. A relay is
+//! claims. The larger epoch makes the larger claim. With equal epochs, the larger claim number makes the larger claim.
+//! A relay is
 //! *active* or *passive*. A passive relay has no setpoint, takes no part in the protocol, and sends only claims.
 //!
 //! Without a key the claim number is sent in a Claim message to a neighbour. The other node with this index receives
@@ -65,7 +66,7 @@ const AFTER_START: Duration = Duration::from_millis(2_000);
 /// Maximum of the doubled intervals between unasked claims. Later claims follow every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims that this relay sends in answer to another node's claim. The interval between them is
+/// Number of claims that this relay sends in answer to a claim of a duplicate. The interval between them is
 /// [`least_interval`].
 const DEFENCES: u8 = 32;
 
@@ -86,17 +87,17 @@ const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
 
-/// State of this relay's claims to its node number, and of another node with the same number.
+/// State of this relay's claims to its node number, and of a duplicate (a node with the same number).
 #[derive(Clone, Debug)]
 pub(crate) struct IndexClaims {
     number: u32,
-    /// Largest claim number received from another node with this relay's node number and epoch. If it exceeds this
+    /// Largest claim number received from a second node with this relay's node number and epoch. If it exceeds this
     /// relay's own, this relay becomes passive.
     rival: u32,
-    /// Last claim number received from another node with this relay's node number; 0 if there is none.
+    /// Last claim number received from a second node with this relay's node number; 0 if there is none.
     last_rival: u32,
-    /// Time of the last frame from another node with this relay's number. The flag is true if this relay already had a
-    /// position when the first such frame arrived. `None` before the first such frame.
+    /// Time of the last frame from a second node with this relay's number (duplicate). The flag is true if this relay
+    /// already had a position when the first such frame arrived. `None` before the first such frame.
     contest: Option<(Instant, bool)>,
     /// Last times at which two nodes with the same number were detected; `None` if never. Entry 0 is for this relay's
     /// number, entry 1 for a neighbour's.
@@ -172,7 +173,7 @@ impl IndexClaims {
         since.is_none_or(|since| since > settings.dead_after.times(2))
     }
 
-    /// Returns true if another node with this relay's number was received recently.
+    /// Returns true if a second node with this relay's number was received recently.
     ///
     /// Recently means within the last three periods of `dead_after`.
     ///
@@ -182,7 +183,7 @@ impl IndexClaims {
         own.is_some_and(|at| now.since(at) < settings.dead_after.times(3))
     }
 
-    /// Returns the sender of a claim to this relay's node number: this relay or another node.
+    /// Returns the sender of a claim to this relay's node number: this relay itself or a duplicate.
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
         if claim.number | RAISED == self.number | RAISED {
             return Sender::Itself;
@@ -199,7 +200,7 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease now, and had
+    /// Records a frame of a second node with this relay's number. Returns true if this relay has a lease now, and had
     /// one when the first such frame arrived.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
@@ -239,8 +240,8 @@ impl IndexClaims {
         false
     }
 
-    /// Compares the claim of another node to this relay's number with this relay's own claim. Returns true if this
-    /// relay becomes passive.
+    /// Compares a duplicate's claim to this relay's number with this relay's own claim. Returns true if this relay
+    /// becomes passive.
     fn compare(
         &mut self,
         now: Instant,
@@ -291,8 +292,8 @@ impl IndexClaims {
         }
     }
 
-    /// Schedules claims in answer to another node's claim `rival` to this relay's number. The claims are repeated for
-    /// some seconds, or until the other node is passive. With signed frames only one claim is sent.
+    /// Schedules claims in answer to a duplicate's claim `rival` to this relay's number. The claims are repeated for
+    /// some seconds, or until the duplicate is passive. With signed frames only one claim is sent.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {

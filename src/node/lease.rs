@@ -19,8 +19,8 @@
 //! | any | lease expired | request a new view; the setpoint stays |
 //!
 //! # Expiry
-//! The expiry stops no motion: the relay keeps its setpoint and requests a new view. Relays of another view may fly to other
-//! positions from then on; the guard's separation fences keep them apart.
+//! The expiry stops no motion: the relay keeps its setpoint and requests a new view. From then on, relays of a
+//! different view may fly to other positions; the guard's separation fences keep them apart.
 //!
 //! | state | after the expiry | code |
 //! | --- | --- | --- |
@@ -73,7 +73,7 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Latest possible end of a lease of another member that this relay's part in renewals has extended.
+    /// Latest possible end of other members' leases that this relay's part in renewals has extended.
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which its agreed positions may be used.
     accepted: (ViewId, Instant),

@@ -122,7 +122,7 @@ struct Uploads {
     loaded_band: Band,
     /// Last mission that this relay or any other relay has refused; `None` if there is none.
     refused: Option<MissionId>,
-    /// Current and previous nonce (random number) in this relay's hellos. A mission offer must repeat one of them.
+    /// Current and previous nonce (random number) in this relay's hellos. A mission offer must repeat either nonce.
     asked: [Asked; 2],
     /// Mission offers to the neighbour toward Tx and to the neighbour toward Rx.
     offering: [Offering; 2],
@@ -166,7 +166,7 @@ impl MissionUpdate {
         self.latest
     }
 
-    /// Returns the active mission or the stored upload, if `id` identifies one of them; else `None`.
+    /// Returns the active mission or the stored upload, whichever `id` identifies; otherwise `None`.
     pub(crate) fn mission_of(&self, member: &Member, id: MissionId) -> Option<Mission> {
         if id == member.active {
             return Some(member.mission);

@@ -13,7 +13,7 @@ use crate::time::{Duration, Instant};
 
 /// Interval at which fence messages to the neighbours are repeated, because a message can be lost.
 ///
-/// A fence is the plane across x that keeps two neighbours apart.
+/// A fence is a plane at right angles to the x axis, which keeps two neighbours on opposite sides.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
 /// Moves a relay's setpoint to the position that the chain has agreed on, as far as the guard permits.
@@ -71,8 +71,8 @@ impl Way {
             return self.wanted;
         }
         self.agreed = agreed;
-        // A new motion during another ends when the other would have ended, so that frequent agreements do not delay
-        // the end.
+        // If a new motion begins during a motion, it ends when the old one would have ended. So frequent agreements do
+        // not delay the end.
         let left = self.motion.map(|it| (it.since + it.span).since(now));
         let span = left.map_or(span, |left| left.min(span));
         self.motion = self

@@ -741,11 +741,11 @@ impl Relay {
         self.node.clear_lost(self.clock.advance(now), side);
     }
 
-    /// Reports that the other node with this relay's node number is gone. See
+    /// Reports that the duplicate of this relay's node number is gone. See
     /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
-    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above that of the
-    /// other node. Of two nodes with the same number, only the one with the larger claim number may have a setpoint.
+    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above the
+    /// duplicate's. Of two nodes with the same number, only the one with the larger claim number may have a setpoint.
     /// Takes constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));

@@ -208,7 +208,7 @@ fn poll(
     }
     relay.persist(store);
     let mut frame = [0; MAX_FRAME];
-    // A link without room must not block the other one, so its frames are counted and dropped.
+    // A link without room must not block the other link, so the frames for it are counted and dropped.
     while links.iter().any(|(_, link)| link.has_room())
         && let Some(Transmit { port, len }) = relay.poll_transmit(now, &mut frame)
     {

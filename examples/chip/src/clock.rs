@@ -24,8 +24,8 @@ pub struct ClockHardware {
     pub over_drive: bool,
 }
 
-/// Board with an STM32F405 and a crystal of 8 MHz. With a crystal of another frequency, or none, the board runs from
-/// the HSI.
+/// Board with an STM32F405 and a crystal of 8 MHz. With a crystal of a different frequency, or none, the board runs
+/// from the HSI.
 pub const STM32F405: ClockHardware = ClockHardware {
     crystal: Some(Crystal {
         hz: 8_000_000,

@@ -6,9 +6,9 @@
 //! | between | payload |
 //! | last | CRC-32C of these words and of the journal's key |
 //!
-//! Records are appended to the sector with the newest one until it is full, then to the other. So the previous record
-//! stays intact until a newer one has been read back. A record that was cut short, lies in worn flash or has another
-//! key fails its CRC and is ignored.
+//! Records are appended to the sector with the newest one until it is full, then to the other sector. So the previous
+//! record stays intact until a newer one has been read back. A record that was cut short, lies in worn flash or has
+//! another key fails its CRC and is ignored.
 //!
 //! An erase stops the CPU. [`Journal::tidy`] erases at a start. In flight [`Journal::append`] erases only with
 //! [`WhenFull::Erase`].

@@ -75,10 +75,10 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// Converts a scenario to a mission of `uavs` relays, and the profiles of relays that differ.
+/// Converts a scenario to a mission of `uavs` relays, and the profiles of relays with own values.
 ///
-/// A relay differs if it has an altitude or a power of its own. The index of a relay is counted from 1. Several
-/// interferers are replaced by one hypothetical interferer.
+/// Such a relay has an altitude or a power of its own. The index of a relay is counted from 1. Several interferers are
+/// replaced by one hypothetical interferer.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.

@@ -283,7 +283,7 @@ impl Scene {
         }
     }
 
-    /// Returns `relay` at the position `at` as a sender to another relay, for [`Scene::sir_at`].
+    /// Returns `relay` at the position `at` as a sender to the next relay, for [`Scene::sir_at`].
     pub fn sender(&self, at: impl Into<Place>, relay: &Relay) -> Sender {
         Sender {
             at: at.into(),

@@ -120,7 +120,7 @@ impl Clearance {
 }
 
 impl LostSide {
-    /// Returns true if the numbers `named` are exactly those of the lost relays on this side, at least one.
+    /// Returns true if the numbers `named` are exactly those of this side's lost relays, at least one.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);

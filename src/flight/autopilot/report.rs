@@ -202,8 +202,8 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. Equal lines must be at least
-    /// `spacing` ms apart.
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. The time between equal lines
+    /// must be at least `spacing` ms.
     fn passes(&mut self, now: Instant, hash: u32, spacing: u32) -> bool {
         self.recent.retain(|(_, until)| left(now, *until).is_some());
         let until = millis(now.as_micros()).wrapping_add(spacing);

@@ -16,7 +16,7 @@
 //! | ArduCopter | other than GUIDED, not CRITICAL | start, restart, disarming; no heartbeat for 3 s |
 //!
 //! So a link that finds OFFBOARD or GUIDED granted at its start takes no control and sends no targets. The pilot must
-//! choose another mode first, and the operator is informed of this. Only the pilot's choice of a mode ends a PX4's
+//! first choose a different mode, and the operator is informed of this. Only the pilot's choice of a mode ends a PX4's
 //! failsafe. Nothing else changes a state: no setpoint, and no message of a neighbour.
 
 /// Control state of the drone. The state shows whether the relay controls the drone, and determines which targets the

@@ -1,7 +1,7 @@
 //! Requests for messages of the autopilot (SET_MESSAGE_INTERVAL).
 //!
-//! A request is repeated if the message arrives too seldom, because another ground station may have changed its rate.
-//! Messages that the autopilot has denied, or that never arrive, are no longer requested.
+//! A request is repeated if the message arrives too seldom, because some ground station may have changed the message's
+//! rate. Messages that the autopilot has denied, or that never arrive, are no longer requested.
 //!
 //! One request is outstanding at a time. An answer (COMMAND_ACK) does not contain the message's id, so it belongs to
 //! that request.

@@ -1,4 +1,4 @@
-//! Signature policy of the link. Without a key all frames are accepted, with a key only those signed with it.
+//! Signature policy of the link. Without a key, all frames are accepted; with a key, only frames signed with that key.
 //!
 //! A link with a key signs its frames and accepts frames that are new and signed with the key. It also accepts unsigned
 //! RADIO_STATUS, because a SiK radio cannot sign. An autopilot with a key ignores unsigned frames silently. So an event

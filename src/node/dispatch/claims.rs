@@ -1,4 +1,4 @@
-//! Claims to this relay's node number, in case another node uses the same number.
+//! Claims to this relay's node number, in case a second node uses the same number.
 
 use super::Node;
 use crate::event::{Event, NodeEvent};
@@ -50,7 +50,7 @@ impl Node {
     }
 
     /// Handles a claim message of node `from`. Nodes with the same node number detect each other by claims. Returns
-    /// false if frames are signed, because signed handshakes then take the place of claims.
+    /// false if frames are signed, because signed handshakes then replace claims.
     ///
     /// A claim of node `from` to its own number is sent back to it as an echo. A claim to this relay's number is
     /// compared with this relay's own claim.
@@ -116,7 +116,7 @@ impl Node {
     /// Returns the renewal's number if `message` is part of a lease renewal and a handshake must follow.
     ///
     /// `None` if `message` requires no handshake. On a shared channel one message of each lease renewal requires a
-    /// handshake. By this handshake another node with the same number detects this relay, even if the chain sends no
+    /// handshake. By this handshake a second node with the same number detects this relay, even if the chain sends no
     /// other message.
     pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {
         let number = match message {

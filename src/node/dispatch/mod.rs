@@ -15,8 +15,8 @@
 //! | `telemetry` | reports of this relay's state, and forwarded reports of other relays |
 //!
 //! A relay without a quorum drops its links after a while, and searches for neighbours again. Otherwise two interleaved
-//! parts, such as 1 - 3 - 5 and 2 - 4, would keep their links forever. So would a part that has not selected the node
-//! toward the rest of the chain. A part without a quorum loses nothing by dropping its links.
+//! parts, such as 1 - 3 - 5 and 2 - 4, would keep their links forever. A part that has not selected the node toward the
+//! rest of the chain would keep its links as well. A part without a quorum loses nothing by dropping its links.
 
 use crate::event::{Event, NodeEvent, Pending};
 use crate::features::SENSING;

@@ -8,10 +8,10 @@
 //! | `NoPeer` | - | - | selected unless its link is held down: at once if it has selected this relay, else after `probe_after` | hello to the four nearest nodes every `dead_after`, every half of `probe_after` once one was received |
 //!
 //! The wait is `dead_after` less `probe_after`, or the longest plausible run of lost frames on this channel if that is
-//! longer. A selected neighbour is `Pairing` until its hello names this relay and reports that it receives it, or any
-//! other message arrives from it. Then it is `Linked`. A hello of the linked node that names this relay but does not
-//! report that it receives it changes nothing, because a run of lost frames is measured by silence. A node that has
-//! selected another one is not selected.
+//! longer. A selected neighbour is `Pairing` until its hello names this relay and reports reception of this relay, or
+//! until any other message of it arrives. Then it is `Linked`. A hello of the linked node that names this relay, but
+//! does not report reception of this relay, changes nothing, because a run of lost frames is measured by silence. A
+//! node that has selected a different node is not selected.
 //!
 //! *Better* is a nearer node that the node beyond it receives. A farther node is better in two cases. Either more
 //! relays follow it than follow the neighbour. Or as many follow it as followed the neighbour in the last view. In the
@@ -47,9 +47,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// This relay and the node have selected each other, according to the node's last report.
+    /// Mutual selection: by the node's last report, this relay and the node have selected each other.
     Linked,
-    /// This relay has selected the node, but the node has not selected this relay, or no longer does.
+    /// One-sided selection: this relay has selected the node, which has not, or no longer, selected it.
     Pairing {
         since: Instant,
     },

@@ -50,8 +50,9 @@ pub(super) struct JointPlace {
 /// Time slots of this relay, each as long as its hop needs. Unused if all slots have the same length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
-    /// This relay's x in the joint solution, m, and its slots at this x, as fractions of the frame. `None` without a
-    /// solution.
+    /// The x of this relay in the joint solution, m, and its slots at this x, as fractions of the frame.
+    ///
+    /// `None` without a solution.
     pub(super) solved: Option<(f32, SlotShares)>,
     /// Start and end of this relay's slots at the agreed positions, as fractions of the frame. `None` without an
     /// agreement.

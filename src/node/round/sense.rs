@@ -33,7 +33,7 @@ const PATIENCE: u8 = 4;
 /// Number of sensing passes in each `Listen::every` during the search for a faulty sensor.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// After this number of consecutive measurements at or below the noise, a sensor may be faulty.
+/// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {

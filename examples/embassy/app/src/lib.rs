@@ -12,7 +12,7 @@
 //!
 //! With a key in the block the relay signs; the epoch in the board's flash rises at every start. With Tx and Rx
 //! positions it flies an autopilot, PX4 or ArduCopter, on a port of its own, and the guard keeps drones apart. Votes
-//! survive a reboot in flight. Uploads do not; `examples/stm32f405` has that.
+//! survive a reboot in flight. Uploads do not; with `examples/stm32f405` they do.
 #![no_std]
 #![forbid(unsafe_code)]
 

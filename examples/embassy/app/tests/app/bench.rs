@@ -1,6 +1,6 @@
 //! Test bench: a drone with the application as relay 1.
 //!
-//! It is wired to relay 2 of 2, or has a radio channel with relays 2 and 3 of 3.
+//! The drone is wired to relay 2 of 2, or has a radio channel with relays 2 and 3 of 3.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;

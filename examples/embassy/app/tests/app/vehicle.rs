@@ -120,7 +120,7 @@ impl Vehicle {
                 self.texts.push(String::from_utf8(text.to_vec()).unwrap());
             }
             if frame[7..HEADER] == id::TIMESYNC.to_le_bytes()[..3] {
-                // Echoes the request's timestamp, and adds a time of its own.
+                // The reply contains the request's timestamp, and a time of the drone's own clock.
                 let mut answer = vec![0; 16];
                 answer[0] = 1;
                 let asked = &frame[HEADER + 8..end - CHECKSUM];

@@ -1,4 +1,4 @@
-//! Relay on a Pico 2 with one UART to a radio shared by all relays, and the other one to an autopilot.
+//! Relay on a Pico 2 with one UART to a radio shared by all relays, and one UART to an autopilot.
 #![no_std]
 #![no_main]
 

@@ -2,9 +2,9 @@
 //!
 //! It also proves that the firmware cannot panic.
 //!
-//! It builds the relay image and the image that counts instructions, with the firmware profile. It reads sizes and
-//! the largest stack from the relay's ELF, and runs the counting image in QEMU. It links the relay image with a panic
-//! handler that cannot be linked. `cargo cost --write` writes the measured costs to the documents.
+//! It builds the relay image and the image that counts instructions, with the firmware profile. It reads sizes and the
+//! largest stack from the relay's ELF, and runs the counting image in QEMU. It links the relay image with a panic
+//! handler that makes the link fail if it is used. `cargo cost --write` writes the measured costs to the documents.
 
 mod counted;
 mod image;
