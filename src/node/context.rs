@@ -344,8 +344,9 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the maximum time from the leader's first message along the chain until its result returns. ¶ The chain has
-/// `all` relays, and loses half of its frames.
+/// Returns the maximum time from the leader's first message along the chain until its result returns.
+///
+/// The chain has `all` relays, and loses half of its frames.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

@@ -118,8 +118,9 @@ use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::FrameLink;
 
-/// Ports of a relay with two links, one to each neighbour. ¶ A link with a driver-enable pin is half duplex, a link
-/// without a pin is full duplex.
+/// Ports of a relay with two links, one to each neighbour.
+///
+/// A link with a driver-enable pin is half duplex, a link without a pin is full duplex.
 #[derive(Debug)]
 pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
     /// Serial link to the neighbour toward the transmitter.

@@ -343,8 +343,9 @@ pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
     Ok(table)
 }
 
-/// Returns line and column of a byte offset, both counted from 1, and the text of that line. ¶ The column is in
-/// characters.
+/// Returns line and column of a byte offset, both counted from 1, and the text of that line.
+///
+/// The column is in characters.
 fn place(text: &str, byte: usize) -> (usize, usize, &str) {
     let before = text.get(..byte).unwrap_or(text);
     let start = before.rfind('\n').map_or(0, |newline| newline + 1);

@@ -30,8 +30,9 @@ use crate::time::{Duration, Instant};
 /// After a silence as long as the maximum lease, it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// Ratio of unanswered requests at a loss to the longest recent run of unanswered requests. ¶ With fewer requests a
-/// neighbour does not count as lost yet.
+/// Ratio of unanswered requests at a loss to the longest recent run of unanswered requests.
+///
+/// With fewer requests a neighbour does not count as lost yet.
 const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour.
@@ -79,8 +80,10 @@ fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     Duration::from_micros(micros)
 }
 
-/// Returns the silence of a neighbour after which a heartbeat is requested. ¶ It is the longer one of
-/// `Settings::probe_after` and the round trip through `all` relays, but at most the longest lease.
+/// Returns the silence of a neighbour after which a heartbeat is requested.
+///
+/// It is the longer one of `Settings::probe_after` and the round trip through `all` relays, but at most the longest
+/// lease.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
@@ -170,8 +173,9 @@ impl Liveness {
         self.lost && !self.was_received
     }
 
-    /// Returns the longest silence that lost frames alone can cause. ¶ The time between two heartbeat requests is
-    /// `tick`.
+    /// Returns the longest silence that lost frames alone can cause.
+    ///
+    /// The time between two heartbeat requests is `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }

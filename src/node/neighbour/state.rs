@@ -507,8 +507,9 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, not counting the nearest. ¶ The nearest node
-    /// is lost. Each of the others could still answer, and so delays the selection of the candidate.
+    /// Returns the number of nodes between this relay and the candidate, not counting the nearest.
+    ///
+    /// The nearest node is lost. Each of the others could still answer, and so delays the selection of the candidate.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }

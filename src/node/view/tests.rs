@@ -192,8 +192,9 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// Checks that a second proposal of the same view, but with a different mission, is no duplicate. ¶ Between the two
-/// proposals the leader has restarted and received that mission.
+/// Checks that a second proposal of the same view, but with a different mission, is no duplicate.
+///
+/// Between the two proposals the leader has restarted and received that mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();

@@ -250,8 +250,9 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Proves that no relay image can panic. ¶ Each image links with a panic handler that would make the link fail if it
-/// were used.
+/// Proves that no relay image can panic.
+///
+/// Each image links with a panic handler that would make the link fail if it were used.
 ///
 /// To test the proof, an image with a deliberate panic must fail to link.
 pub(crate) fn no_panic() -> Result<(), String> {
