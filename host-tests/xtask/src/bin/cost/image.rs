@@ -178,6 +178,15 @@ fn cargo(command: &str, example: &str) -> Command {
     cargo
 }
 
+/// Returns the path of the disassembler.
+///
+/// # Errors
+/// The command to type, if the disassembler is missing.
+pub(crate) fn objdump() -> Result<PathBuf, String> {
+    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
+    llvm_tool("llvm-objdump").ok_or_else(|| missing.to_owned())
+}
+
 /// Builds a firmware example with the cargo options `more`; returns the path of its ELF file.
 pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
     run(cargo("build", example).args(more))?;
@@ -210,9 +219,7 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 /// with its FPU registers. `pair` is true for ports to two neighbours, `flies` for a port to an autopilot.
 pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
-    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
-    let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
-    let output = run(Command::new(objdump)
+    let output = run(Command::new(objdump()?)
         .args(["-d", "--no-show-raw-insn"])
         .arg(elf))?;
     let bytes = std::fs::read(elf).map_err(|error| error.to_string())?;
@@ -281,9 +288,7 @@ pub(crate) fn no_panic() -> Result<(), String> {
 fn only_finished_futures_panic() -> Result<(), String> {
     const FINISHED: &str = "panic_const_async_fn_resumed";
     let image = build(ASYNC, ASYNC_FEATURES)?;
-    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
-    let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
-    let output = run(Command::new(objdump)
+    let output = run(Command::new(objdump()?)
         .args(["-d", "-C", "--no-show-raw-insn"])
         .arg(&image))?;
     let text = String::from_utf8_lossy(&output.stdout);

@@ -89,6 +89,9 @@ fn version(program: &str) -> Result<String, String> {
 }
 
 fn measure() -> Result<Vec<Row>, String> {
+    // A missing tool is reported before the builds, which take minutes.
+    image::objdump()?;
+    version("qemu-system-arm")?;
     image::no_panic()?;
     let mut rows = image::of_the_relay_image()?;
     rows.extend(counted::of_the_counting_image()?);
