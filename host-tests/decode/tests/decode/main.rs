@@ -7,6 +7,7 @@
 )]
 
 mod document;
+mod envelope;
 mod files;
 mod live;
 
