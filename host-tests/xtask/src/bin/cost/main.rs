@@ -87,7 +87,7 @@ fn version(program: &str) -> Result<String, String> {
 }
 
 fn measure() -> Result<Vec<Row>, String> {
-    image::no_panic()?;
+    image::a_panic_is_found()?;
     let mut rows = image::of_the_relay_image()?;
     rows.extend(counted::of_the_counting_image()?);
     Ok(rows)
