@@ -1,11 +1,7 @@
 //! Figures of flights whose reports are made up: long ones, outages, and near passes.
 
 #![cfg(not(target_os = "none"))]
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "a test fails by it"
-)]
+#![cfg(test)]
 
 use uav_relay::Placement;
 use uav_relay::wire::frame::Header;

@@ -1,12 +1,8 @@
 //! Captures of a simulated flight, one of each node, with clocks of their own: merged, shown, refused.
 
 #![cfg(not(target_os = "none"))]
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    reason = "a test fails by it"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,12 +1,6 @@
 //! Fitted slots on board: positions and rates of the joint method. They are compared with the planner's shortest path.
 //!
 //! `COUNT` and `SEED` in the environment set the number of scenes and the first seed.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 mod flown;
 mod scenes;

@@ -1,11 +1,5 @@
 //! `cargo compare` without Python: scores, tables, and errors if Python is missing.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 mod kept;
 

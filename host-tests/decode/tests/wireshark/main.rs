@@ -2,13 +2,8 @@
 //! of every kind.
 //!
 //! Without `tshark` these tests fail and say how to install it.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 mod drawn;
 mod pdml;
