@@ -92,7 +92,7 @@ fn measure() -> Result<Vec<Row>, String> {
     // A missing tool is reported before the builds, which take minutes.
     image::objdump()?;
     version("qemu-system-arm")?;
-    image::no_panic()?;
+    image::a_panic_is_found()?;
     let mut rows = image::of_the_relay_image()?;
     rows.extend(counted::of_the_counting_image()?);
     Ok(rows)
