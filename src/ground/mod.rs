@@ -662,7 +662,11 @@ impl Watching {
             return false;
         }
         // The first agreement needs the channel.
-        let overheard = if self.known.is_empty() { 0 } else { self.overheard };
+        let overheard = if self.known.is_empty() {
+            0
+        } else {
+            self.overheard
+        };
         let is_near = move |it: &u16| *it <= CANDIDATES || overheard & bit(*it) != 0;
         // Two stations do not request at the same time again and again.
         let cycle = WATCH_EVERY.as_micros() + 100_000 * (node % 7);

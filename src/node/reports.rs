@@ -49,6 +49,9 @@ const UNCONFIRMED: Duration = Duration::from_millis(3000);
 /// reports.
 const MOST_DOUBLINGS: u8 = 3;
 
+/// Number in place of a count of unconfirmed Watches: the relay four numbers away sends its reports to the station itself.
+const DIRECT: u8 = MOST_DOUBLINGS + 1;
+
 /// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
 /// reports.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
@@ -155,10 +158,8 @@ struct Watched {
     hand_on: u8,
     hand_on_at: Instant,
     /// Time of the last report of the relay that is four numbers farther from the station, or of its last frame to the
-    /// station. `is_direct` is true for a frame to the station.
+    /// station. `unconfirmed` is `DIRECT` after the latter, else it counts the Watches sent to that relay since then.
     confirmed: Instant,
-    is_direct: bool,
-    /// Number of Watches (requests for reports) sent to that relay since its last report to this one.
     unconfirmed: u8,
     /// Node to which a handshake must be sent that requests a reply; `None` if there is none.
     to_greet: Option<NonZeroU16>,
@@ -237,7 +238,7 @@ impl Reporting {
             if from == beyond(member, side.other(), CANDIDATES)
                 && to == beyond(member, side, from_end(member, side))
             {
-                (watched.confirmed, watched.is_direct) = (now, true);
+                (watched.confirmed, watched.unconfirmed) = (now, DIRECT);
             }
         }
     }
@@ -450,7 +451,8 @@ impl Reporting {
             if is_pair || begins || number.is_multiple_of(4) {
                 watched.hand_on |= mask(1);
             }
-            if !is_pair && !(watched.is_direct && now < watched.confirmed + UNCONFIRMED) {
+            let is_direct = watched.unconfirmed == DIRECT && now < watched.confirmed + UNCONFIRMED;
+            if !is_pair && !is_direct {
                 watched.hand_on |= mask(CANDIDATES);
             }
         } else if ahead != 0 {
@@ -490,8 +492,7 @@ impl Reporting {
             return true;
         }
         if from.abs_diff(member.node) == CANDIDATES {
-            (watched.confirmed, watched.is_direct) = (now, false);
-            watched.unconfirmed = 0;
+            (watched.confirmed, watched.unconfirmed) = (now, 0);
         }
         let missed = watched.number.wrapping_sub(report.number());
         if (1..0x8000).contains(&missed) && now >= watched.hand_on_at + REPEAT_AFTER {

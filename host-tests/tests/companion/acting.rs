@@ -226,7 +226,10 @@ fn random_previews_are_flown_as_they_were_shown() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut chain, station, page) = chain_with_page();
     // Rx beyond the geofence: no relay would be outside, but the refusal names the limit and a relay.
-    assert_eq!(page.post("/preview", &json!({ "receiver": "1010,0" })).0, 200);
+    assert_eq!(
+        page.post("/preview", &json!({ "receiver": "1010,0" })).0,
+        200
+    );
     let fault = page.until("failed")["fault"].take();
     let why = "distance 1010 m: must be within 0 to 1000 m (the relays' geofence, set before flight by --distance); every relay with a drone refuses it: nearest to the limit is relay 2, at x ";
     assert!(fault.as_str().unwrap().starts_with(why), "{fault}");

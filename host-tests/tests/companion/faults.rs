@@ -258,7 +258,9 @@ impl Stage {
                     own.lacks_quorum
                 };
                 if !is_true && self.untrue.insert(format!("relay {number}: {text}")) {
-                    println!("  untrue, {now_s:.1} s, relay {number}, age {age_s} s: {text}: {own:?}");
+                    println!(
+                        "  untrue, {now_s:.1} s, relay {number}, age {age_s} s: {text}: {own:?}"
+                    );
                 }
             }
         }
@@ -373,7 +375,8 @@ impl Stage {
         }
         let hurt: Vec<usize> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
         // With both ends or most relays lost, the rest of the chain has no lease for a while, and may have no quorum.
-        let is_torn = group.iter().filter(|it| it.0 == "kill").count() > 1 || group[0].0 == "no quorum";
+        let is_torn =
+            group.iter().filter(|it| it.0 == "kill").count() > 1 || group[0].0 == "no quorum";
         for it in &new {
             let text = it["text"].as_str().unwrap();
             let by = text.strip_prefix(NO_QUORUM);
@@ -389,7 +392,9 @@ impl Stage {
         println!("  longest times without a lease, by the relays: {longest_s:.1?} s");
         let most_s = longest_s.into_iter().fold(0.0, f64::max);
         if most_s > EXPIRED_S + SOON_S + NEAR_S && !self.has_expired {
-            failures.push(format!("{group:?}: no lease for {most_s:.1} s, but no alarm"));
+            failures.push(format!(
+                "{group:?}: no lease for {most_s:.1} s, but no alarm"
+            ));
         }
         for fault in group {
             let of = |it: &&Value| {

@@ -315,7 +315,13 @@ fn the_page_has_the_bytes_a_second() {
     let cases = [
         ("8 relays on one channel, one station", 8, channel, 0.0, 1),
         ("8 relays on one channel, two stations", 8, channel, 0.0, 2),
-        ("8 relays on one channel, half of all frames lost", 8, channel, 0.5, 1),
+        (
+            "8 relays on one channel, half of all frames lost",
+            8,
+            channel,
+            0.5,
+            1,
+        ),
         ("8 relays on wires, one station", 8, None, 0.0, 1),
         ("100 relays on wires, one station", 100, None, 0.0, 1),
     ];

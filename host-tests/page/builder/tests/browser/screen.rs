@@ -455,6 +455,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     assert_eq!(browser.value("map.fitted"), true);
     task.reply(Err("no".to_owned()));
     save("desk", &browser.screenshot());
+    browser.passes_axe("preview of a mission");
     // The browser reports each refused request.
     let errors = browser.errors();
     assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
