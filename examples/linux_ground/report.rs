@@ -191,6 +191,9 @@ impl FenceViolation {
     }
 
     /// Returns a text with the value, its permitted range, and the relay that would fly farthest outside.
+    ///
+    /// If none would fly outside, as with a receiver beyond the limit, the text has the relay nearest to the limit. With
+    /// unknown moves it has neither.
     pub(crate) fn line(&self, moves: Option<&[Move]>) -> String {
         let Self { what, name, .. } = self;
         let [least, most] = self.range_m;
@@ -198,15 +201,19 @@ impl FenceViolation {
             let at = (self.coordinate)(&it.after);
             (least - at).max(at - most)
         };
+        let who = format!("{what}; every relay with a drone refuses it");
         let moves = moves.unwrap_or_default().iter().rev();
-        let outside = moves.filter(|it| beyond_m(it) > 0.0);
-        match outside.max_by(|one, other| beyond_m(one).total_cmp(&beyond_m(other))) {
+        match moves.max_by(|one, other| beyond_m(one).total_cmp(&beyond_m(other))) {
             Some(it) => {
-                let at = (self.coordinate)(&it.after);
-                let index = it.index;
-                format!("{what}; farthest outside is relay {index}, at {name} {at:.1} m")
+                let (at, index) = ((self.coordinate)(&it.after), it.index);
+                let place = if beyond_m(it) > 0.0 {
+                    "farthest outside"
+                } else {
+                    "nearest to the limit"
+                };
+                format!("{who}: {place} is relay {index}, at {name} {at:.1} m")
             }
-            None => what.clone(),
+            None => who,
         }
     }
 }

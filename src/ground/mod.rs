@@ -18,6 +18,7 @@ use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant, MonotonicClock};
 use crate::view::ViewId;
+use crate::wire::STATION_REACH;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
@@ -117,10 +118,7 @@ impl Ground {
     /// (start counter) in `auth` must be larger at every start.
     pub fn new(base: &Mission, end: Side, network: u16, wiring: Wiring, auth: Auth) -> Self {
         let all = base.relays();
-        let reach = match wiring {
-            Wiring::Pair => 1,
-            Wiring::Shared => CANDIDATES,
-        };
+        let watching = Watching::new(auth.parts().1, all, wiring);
         let node = match end {
             Side::Upstream => 0,
             Side::Downstream => all + 1,
@@ -131,7 +129,7 @@ impl Ground {
             base: digest(base),
             end,
             node,
-            reach: reach.min(all),
+            reach: watching.reach.min(CANDIDATES),
             upload: None,
             progress: Progress::Idle,
             query_number: 0,
@@ -145,7 +143,7 @@ impl Ground {
             repeat_at: None,
             clock: MonotonicClock::new(Instant::ZERO),
             reports: PendingReports::NONE,
-            watching: Watching::new(auth.parts().1, all),
+            watching,
             deframer: Deframer::new(),
             endpoint,
             stats: Stats::default(),
@@ -268,13 +266,14 @@ impl Ground {
             {
                 let header = frame.header;
                 let distance = header.sender.abs_diff(self.node);
+                self.watching.overheard |= bit(distance);
                 if header.destination != self.node {
                     bump(&mut self.stats.overheard);
-                } else if (1..=self.reach).contains(&distance) {
+                } else if (1..=self.watching.reach).contains(&distance) {
                     let now = self.clock.now();
                     match self.endpoint.check(now, &frame, &mut self.stats) {
                         Some(Checked::Fresh { .. }) => {
-                            self.watching.hear(distance);
+                            self.watching.heard |= bit(distance);
                             let message = Message::decode(frame.body);
                             self.handle_message(header.sender, distance, message.as_ref().ok());
                         }
@@ -443,7 +442,7 @@ impl Ground {
         let now = self.clock.advance(now);
         if TELEMETRY {
             self.watching.apply(now);
-            let is_silent = self.watching.request(now, self.reach, self.node.into());
+            let is_silent = self.watching.request(now, self.node.into());
             let to = self.at(self.watching.distance);
             if let Some(session) = self.endpoint.session_mut().filter(|_| is_silent) {
                 // The relay may have restarted. Then it accepts only handshakes.
@@ -580,7 +579,7 @@ impl Ground {
     pub fn watch(&mut self, now: Instant, is_on: bool) {
         let now = self.clock.advance(now);
         self.watching.repeat_at = is_on.then_some(now);
-        _ = self.watching.request(now, self.reach, self.node.into());
+        _ = self.watching.request(now, self.node.into());
     }
 
     /// Returns the newest report of each relay, in the order of the node numbers. At most 128 relays are stored: those
@@ -602,6 +601,10 @@ impl Ground {
 struct Watching {
     /// Number of relays in the mission.
     all: u16,
+    /// Number of nearest relays that may be asked: one over a wire, up to eight over a shared channel.
+    reach: u16,
+    /// Bit mask of the relays of which any frame was received since the last request to them.
+    overheard: u8,
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
@@ -632,9 +635,15 @@ impl Watching {
     /// 85 minutes, the numbers of the next run can be smaller. Relays then ignore requests until 60 s after the last
     /// request of the earlier run.
     #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
-    const fn new(epoch: u32, all: u16) -> Self {
+    fn new(epoch: u32, all: u16, wiring: Wiring) -> Self {
+        let most = match wiring {
+            Wiring::Pair => 1,
+            Wiring::Shared => STATION_REACH,
+        };
         Self {
             all,
+            reach: most.min(all),
+            overheard: 0,
             repeat_at: None,
             number: (epoch as u16) << 10,
             distance: 0,
@@ -645,33 +654,36 @@ impl Watching {
         }
     }
 
-    /// Records a message of the relay at `distance`.
-    const fn hear(&mut self, distance: u16) {
-        self.heard |= bit(distance);
-    }
-
-    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The first request goes to
-    /// the farthest relay.
+    /// Schedules a request for reports, if due, to the next relay. The farthest comes first. Relays at distances above 4
+    /// are left out before the first report, and if no frame of them was received since the last request.
     ///
     /// Returns true if that relay has sent no message since the last request to it.
-    fn request(&mut self, now: Instant, reach: u16, node: u64) -> bool {
-        let mut is_silent = false;
-        if self.repeat_at.is_some_and(|at| at <= now) {
-            // The node number keeps two stations from requesting at the same times.
-            let turn = (WATCH_EVERY.as_micros() + 100_000 * (node % 7)) / u64::from(reach.max(1));
-            self.repeat_at = Some(now + Duration::from_micros(turn));
-            if self.distance <= 1 {
-                self.number = self.number.wrapping_add(1);
-            }
-            self.distance = if self.distance > 1 {
-                self.distance - 1
-            } else {
-                reach
-            };
-            self.is_due = true;
-            is_silent = self.heard & bit(self.distance) == 0;
-            self.heard &= !bit(self.distance);
+    fn request(&mut self, now: Instant, node: u64) -> bool {
+        if self.repeat_at.is_none_or(|at| at > now) {
+            return false;
         }
+        // The first agreement needs the channel.
+        let overheard = if self.known.is_empty() {
+            0
+        } else {
+            self.overheard
+        };
+        let is_near = move |it: &u16| *it <= CANDIDATES || overheard & bit(*it) != 0;
+        // Two stations do not request at the same time again and again.
+        let cycle = WATCH_EVERY.as_micros() + 100_000 * (node % 7);
+        let asked = (1..=self.reach).filter(is_near).map(|_| 1).sum::<u64>();
+        self.repeat_at = Some(now + Duration::from_micros(cycle / asked.max(1)));
+        let mut next = (1..self.distance).rev().find(is_near);
+        if next.is_none() {
+            self.number = self.number.wrapping_add(1);
+            next = (1..=self.reach).rev().find(is_near);
+        }
+        self.distance = next.unwrap_or(1);
+        self.is_due = true;
+        let bit = bit(self.distance);
+        let is_silent = self.heard & bit == 0;
+        self.heard &= !bit;
+        self.overheard &= !bit;
         is_silent
     }
 

@@ -29,7 +29,7 @@ pub(crate) struct Reporting([Option<(Side, Message)>; AUTH as usize]);
 impl Reporting {
     pub(crate) fn handle_position(&mut self, _: Instant, _: Placement) {}
 
-    pub(crate) fn handle_frame(&mut self, _: Instant, _: u16) {}
+    pub(crate) fn handle_frame(&mut self, _: Instant, _: &Member, _: u16, _: u16) {}
 
     pub(crate) fn handle_session(&mut self, _: Instant, _: &Member, _: Side, _: u16) {}
 

@@ -10,8 +10,8 @@
 //! | own control state, or that in a stored entry, has changed and [begins an alarm](begins_alarm); a node is refused for another mission | send the entry ahead of its turn, also during an agreement |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
-//! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
-//! neighbour, too: reports then skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. A relay that has sent no frame for 2.5 s is no destination. The time between two reports of a relay is proportional to the first one's
+//! On a shared channel a station sends its Watches to the eight nearest relays, which report to it. A Watch is also handed on to the relay
+//! four numbers away, repeatedly until that relay reports, unless it sends to the station itself. Every fourth one goes to the neighbour, too. So reports skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. A relay that has sent no frame for 2.5 s is no destination. The time between two reports of a relay is proportional to the first one's
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
 //! `handing_on` takes the place of this file.
 
@@ -29,16 +29,17 @@ use crate::settings::Wiring;
 use crate::side::Side;
 use crate::telemetry::REFUSED;
 use crate::time::{Duration, Instant};
+use crate::wire::STATION_REACH;
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 
 /// Time for which a relay sends reports after its last Watch. A Watch is a ground station's request for reports.
 const WATCHED: Duration = Duration::from_millis(60_000);
 
-/// Time for which a relay sends its reports to the sender of the last Watch. A Watch is a request for reports. Four
+/// Time for which a relay sends its reports to the sender of the last Watch. A Watch is a request for reports. Ten
 /// lost Watches in a row do not change this destination.
-const DESTINED: Duration = Duration::from_millis(25_000);
+const DESTINED: Duration = Duration::from_millis(55_000);
 
-/// Time without any frame from a relay after which no more reports are sent to it.
+/// Time without any frame from a relay after which no more reports are sent to it. For a station it is three times as long.
 const UNHEARD: Duration = Duration::from_millis(2_500);
 
 /// Time without a report from a relay after which the Watch to it (request for reports) is repeated.
@@ -47,6 +48,9 @@ const UNCONFIRMED: Duration = Duration::from_millis(3000);
 /// Maximum number of times that the interval between repetitions of a Watch doubles. A Watch is a request for
 /// reports.
 const MOST_DOUBLINGS: u8 = 3;
+
+/// Number in place of a count of unconfirmed Watches: the relay four numbers away sends its reports to the station itself.
+const DIRECT: u8 = MOST_DOUBLINGS + 1;
 
 /// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
 /// reports.
@@ -153,8 +157,8 @@ struct Watched {
     /// distances from this relay.
     hand_on: u8,
     hand_on_at: Instant,
-    /// Time of the last report from the relay that is four numbers farther from the station. `unconfirmed` counts the
-    /// Watches (requests for reports) sent to this relay since then.
+    /// Time of the last report of the relay that is four numbers farther from the station, or of its last frame to the
+    /// station. `unconfirmed` is `DIRECT` after the latter, else it counts the Watches sent to that relay since then.
     confirmed: Instant,
     unconfirmed: u8,
     /// Node to which a handshake must be sent that requests a reply; `None` if there is none.
@@ -223,10 +227,19 @@ impl Reporting {
         }
     }
 
-    /// Records that a frame of node `from` was received, whatever its destination.
-    pub(crate) fn handle_frame(&mut self, now: Instant, from: u16) {
-        for watched in self.watched.iter_mut().filter(|it| it.to == Some(from)) {
-            watched.heard = now;
+    /// Records that a frame of node `from` to node `to` was received.
+    pub(crate) fn handle_frame(&mut self, now: Instant, member: &Member, from: u16, to: u16) {
+        let sides = [Side::Upstream, Side::Downstream];
+        for (watched, side) in self.watched.iter_mut().zip(sides) {
+            if watched.to == Some(from) {
+                watched.heard = now;
+            }
+            // The relay four numbers farther from the station reports to the station itself.
+            if from == beyond(member, side.other(), CANDIDATES)
+                && to == beyond(member, side, from_end(member, side))
+            {
+                (watched.confirmed, watched.unconfirmed) = (now, DIRECT);
+            }
         }
     }
 
@@ -382,11 +395,11 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 impl Watched {
     /// Ends the reports 60 s after the last request for them, and drops silent destinations.
     ///
-    /// A destination is dropped if it has sent no request for 25 s. A destination that is a relay is also dropped if
-    /// it has sent no frame for 2.5 s.
+    /// A destination is dropped if it has sent no request for 55 s, or no frame for 2.5 s (a relay) or 7.5 s (a
+    /// station).
     fn expire(&mut self, now: Instant, member: &Member) {
-        let is_unheard =
-            now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));
+        let is_relay = self.to.is_some_and(|to| is_relay(member, to));
+        let is_unheard = now >= self.heard + UNHEARD.times(if is_relay { 1 } else { 3 });
         if now >= self.until {
             *self = Self::default();
         } else if now >= self.to_until || is_unheard {
@@ -434,11 +447,14 @@ impl Reporting {
             // The station sends to several relays at once.
             let turn = Duration::from_millis(50).times(u32::from(member.node % 8) + 2);
             watched.hand_on_at = now + turn;
-            watched.hand_on |= match member.settings.wiring {
-                Wiring::Pair => mask(1),
-                Wiring::Shared if begins || number.is_multiple_of(4) => mask(1) | mask(CANDIDATES),
-                Wiring::Shared => mask(CANDIDATES),
-            };
+            let is_pair = member.settings.wiring == Wiring::Pair;
+            if is_pair || begins || number.is_multiple_of(4) {
+                watched.hand_on |= mask(1);
+            }
+            let is_direct = watched.unconfirmed == DIRECT && now < watched.confirmed + UNCONFIRMED;
+            if !is_pair && !is_direct {
+                watched.hand_on |= mask(CANDIDATES);
+            }
         } else if ahead != 0 {
             return;
         }
@@ -476,8 +492,7 @@ impl Reporting {
             return true;
         }
         if from.abs_diff(member.node) == CANDIDATES {
-            watched.confirmed = now;
-            watched.unconfirmed = 0;
+            (watched.confirmed, watched.unconfirmed) = (now, 0);
         }
         let missed = watched.number.wrapping_sub(report.number());
         if (1..0x8000).contains(&missed) && now >= watched.hand_on_at + REPEAT_AFTER {
@@ -551,26 +566,21 @@ impl Reporting {
         let period = period(member, side, byte);
         let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
         let (control, power_w) = (self.control, self.power_w);
-        let (watched, reported) = {
-            let [upstream, downstream] = &mut self.watched;
-            let watched = match side {
-                Side::Upstream => upstream,
-                Side::Downstream => downstream,
-            };
-            (watched, &mut self.reported)
-        };
+        let reported = self.reported;
+        let watched = self.at(side);
         let mut report = Reports::new(watched.number, member.digest);
         // An alarm of this relay is part of a report about others, even before its turn.
-        let is_due = now >= watched.own_from || watched.is_alarmed && now >= *reported + STEP;
+        let is_due = now >= watched.own_from || watched.is_alarmed && now >= reported + STEP;
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
             // A position from before the last entry would not count as newer than that entry.
             let state_at = position.map_or(now, |(at, _)| at);
-            *reported = state_at.max(*reported + STEP).min(now);
-            let age = age(now, *reported);
+            let reported = state_at.max(reported + STEP).min(now);
+            let age = age(now, reported);
             let [state, before, after] = own.0;
             // An entry has room for one node.
             let is_turn = after == 0 || watched.count.is_multiple_of(2);
+            self.reported = reported;
             let refusal = if before != 0 && is_turn {
                 before
             } else {
@@ -662,7 +672,7 @@ impl Reporting {
     /// bytes, divided among the relays in proportion to their loads.
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = (settings.hop_time.as_micros() * 106 / 1_200).clamp(1, 1 << 24);
+        let hop = (settings.hop_time.as_micros() * 108 / 1_200).clamp(1, 1 << 24);
         let hop = u32::try_from(hop).unwrap_or(u32::MAX);
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),
@@ -693,18 +703,18 @@ const fn from_end(member: &Member, side: Side) -> u16 {
 /// Returns the number of bytes that a relay is assumed to report in each period. `distance` is the difference between
 /// its number and the station's number.
 ///
-/// These bytes are the relay's own entry (its state), and the entries of the relays that are 4, 8, 12 and so on
+/// These bytes are the relay's own entry (its state), and the entries of the relays that are 8, 16, 24 and so on
 /// numbers farther from the station.
 const fn load(member: &Member, distance: u16) -> u32 {
-    let behind = member.all.saturating_sub(distance) / CANDIDATES;
+    let behind = member.all.saturating_sub(distance) / STATION_REACH;
     SHARE * (behind as u32 + 2)
 }
 
 /// Returns the sum of [`load`] over all distances, 1 to N.
 const fn all_loads(member: &Member) -> u32 {
     let all = member.all as u32;
-    let (fours, rest) = (all / 4, all % 4);
-    SHARE * (2 * all + fours * (2 * fours).saturating_sub(2) + rest * fours)
+    let (eights, rest) = (all / 8, all % 8);
+    SHARE * (2 * all + 4 * eights * eights.saturating_sub(1) + rest * eights)
 }
 
 /// Returns the time between two reports of a relay. On wires the result is the time of the relay nearest to the

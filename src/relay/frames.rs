@@ -26,7 +26,7 @@ pub(super) fn receive(
     let (own, header) = (node.member().node, frame.header);
     let is_duplicate = header.sender == own;
     if port == Port::Shared {
-        node.on_channel(now, header.sender);
+        node.on_channel(now, header.sender, header.destination);
     }
     if header.destination != own && port == Port::Shared {
         bump(&mut node.stats_mut().overheard);

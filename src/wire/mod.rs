@@ -30,5 +30,8 @@ pub const MAX_NODE: u16 = 4094;
 /// Number of nearest nodes in one direction to which hellos are sent. One of them becomes the neighbour.
 pub(crate) const CANDIDATES: u16 = 4;
 
+/// Number of nearest relays with which Tx or Rx exchanges messages on a shared channel.
+pub(crate) const STATION_REACH: u16 = 2 * CANDIDATES;
+
 /// Maximum length on the wire of a sweep message with its frame, bytes. A sweep carries up to sixteen target SIRs.
 pub const MAX_SWEEP: usize = 100 + auth::TAG_ROOM;

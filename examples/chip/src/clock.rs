@@ -85,7 +85,8 @@ impl Clocks {
     }
 }
 
-const PLL_INPUT_HZ: u32 = 2_000_000;
+/// Frequency of the PLL's input, Hz: that of its source, divided.
+pub const PLL_INPUT_HZ: u32 = 2_000_000;
 
 /// PLL settings for one frequency of the core.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

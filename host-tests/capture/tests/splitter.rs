@@ -1,5 +1,5 @@
-//! Tests: splitting does not depend on the reads, and a capture returns the frames written to it.
-#![allow(clippy::unwrap_used, missing_docs)]
+//! Splitting does not depend on the reads, and a capture returns the frames written to it.
+#![cfg(test)]
 
 use std::convert::Infallible;
 use std::time::Duration;

@@ -289,7 +289,7 @@ fn chart(flight: &Flight, known: impl Iterator<Item = (usize, f64)> + Clone) -> 
         last = Some(step);
     }
     format!(
-        "<h2>SIR of the worst hop, dB</h2>\n<svg id=\"chart\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"SIR of the worst hop over time\">{marks}<path class=\"sir\" d=\"{line}\"/><path id=\"cursor\" d=\"M0 8V{:.1}\"/></svg>\n",
+        "<h2>SIR of the worst hop, dB</h2>\n<div class=\"scrolled\" tabindex=\"0\" role=\"region\" aria-label=\"Chart of the SIR\"><svg id=\"chart\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"SIR of the worst hop over time\">{marks}<path class=\"sir\" d=\"{line}\"/><path id=\"cursor\" d=\"M0 8V{:.1}\"/></svg></div>\n",
         height - bottom
     )
 }

@@ -1,11 +1,7 @@
 //! Tests of a flight's figures with made-up reports: long flights, outages, and near passes.
 
 #![cfg(not(target_os = "none"))]
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "a test fails by it"
-)]
+#![cfg(test)]
 
 use uav_relay::Placement;
 use uav_relay::wire::frame::Header;

@@ -1,12 +1,8 @@
 //! Tests with captures of a simulated flight, one for each node, whose clocks differ.
 
 #![cfg(not(target_os = "none"))]
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    reason = "a test fails by it"
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

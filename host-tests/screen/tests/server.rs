@@ -1,13 +1,7 @@
 //! Server under load: many browsers, foreign pages, malformed requests and slow readers.
 //!
 //! The chain must not notice them: each test measures how long `Screen::show` takes meanwhile.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};

@@ -1,13 +1,6 @@
 //! Alarms and log lines of a station, by reports alone. The script `faults.txt` has faults and the alarms that they raise.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::expect_used,
-    dead_code,
-    unreachable_pub,
-    missing_docs
-)]
+#![cfg(test)]
+#![allow(dead_code, unreachable_pub)]
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,12 +1,7 @@
 //! Capacity of a shared channel. How many relays agree and stay in agreement, and with how many messages.
 //!
 //! `-- --ignored --nocapture` prints the tables of long chains.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 use uav_relay::{Instant, Mission};
 use uav_relay_scenario::{Scenario, mission};

@@ -1,12 +1,6 @@
 //! Events for the operator name the node and the cause.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::unnecessary_wraps,
-    clippy::redundant_closure_for_method_calls,
-    reason = "as every test may"
-)]
+#![cfg(test)]
+#![allow(clippy::unnecessary_wraps, clippy::redundant_closure_for_method_calls)]
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};

@@ -2,12 +2,7 @@
 //!
 //! `COUNT` and `SEED` in the environment set the number and the first seed of random runs. `-- --ignored --nocapture` prints the
 //! tables of long runs.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,5 +1,5 @@
 //! Film of a run: complete, and without influence on the run.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
+#![cfg(test)]
 
 use std::collections::BTreeMap;
 

@@ -1,10 +1,5 @@
 //! Pages for users: valid tables, existing pictures, and figures equal to the commands' output.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

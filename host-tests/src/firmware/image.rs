@@ -1,4 +1,4 @@
-//! Firmware image, built by cargo into a folder of its own, which an outer cargo does not lock.
+//! Firmware images, built by cargo for the tests.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,19 +9,20 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// Cargo profile of the firmware images.
 pub const PROFILE: &str = "firmware";
 
-/// Builds the firmware `examples` and returns the folder of their images, valid until the next build.
+/// Builds the firmware `examples` and returns the folder with copies of their images.
 ///
-/// With `smallest` the log is the only feature, otherwise all features are built.
+/// If `smallest` is true, the images are built with the log as the only feature, otherwise with all features. The name
+/// of a copy is that of the example, after `smallest_` if `smallest` is true. The builds are in the usual target folder,
+/// where `cargo cost` and `cargo ci` find their dependencies again.
 ///
 /// # Errors
-/// The output of cargo, if it fails.
+/// The output of cargo, if it fails; or a copy that cannot be written.
 pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .ok_or("the workspace has moved since this program was built")?;
-    let folder = std::env::var_os("CARGO_TARGET_DIR")
-        .map_or_else(|| root.join("target"), PathBuf::from)
-        .join("emulated");
+    let folder =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     command
@@ -45,12 +46,28 @@ pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     let output = command
         .output()
         .map_err(|error| format!("cargo cannot be run: {error}"))?;
-    if output.status.success() {
-        Ok(folder.join(TARGET).join(PROFILE).join("examples"))
-    } else {
-        Err(format!(
+    if !output.status.success() {
+        return Err(format!(
             "the firmware cannot be built (for a missing target, type: rustup target add {TARGET})\n{}",
             String::from_utf8_lossy(&output.stderr)
-        ))
+        ));
     }
+    let copies = folder.join("emulated");
+    let copy = |example: &&str| {
+        let name = if smallest {
+            format!("smallest_{example}")
+        } else {
+            (*example).to_owned()
+        };
+        let image = folder
+            .join(TARGET)
+            .join(PROFILE)
+            .join("examples")
+            .join(example);
+        std::fs::copy(image, copies.join(name)).map(drop)
+    };
+    std::fs::create_dir_all(&copies)
+        .and_then(|()| examples.iter().try_for_each(copy))
+        .map_err(|error| format!("{}: {error}", copies.display()))?;
+    Ok(copies)
 }

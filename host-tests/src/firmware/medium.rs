@@ -1,7 +1,6 @@
 //! Links between drones, with faults and latency of frames. They have no clock of their own.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use chacha20::ChaCha8Rng;
@@ -14,26 +13,6 @@ use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 /// Maximum number of bytes collected while a link waits for a delimiter.
 const LONGEST: usize = 2 * MAX_FRAME;
 
-#[derive(Clone, PartialEq, Eq, Debug)]
-struct Flying {
-    at: Instant,
-    order: u64,
-    receiver: usize,
-    bytes: Vec<u8>,
-}
-
-impl Ord for Flying {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        (self.at, self.order).cmp(&(other.at, other.order))
-    }
-}
-
-impl PartialOrd for Flying {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 /// Simulated links between drones, with latency and faults. The caller numbers senders and receivers.
 #[derive(Debug)]
 pub struct Medium {
@@ -41,7 +20,8 @@ pub struct Medium {
     faults: Faults,
     rng: ChaCha8Rng,
     injected: Injected,
-    flying: BinaryHeap<Reverse<Flying>>,
+    /// Receivers and bytes of the frames in transit, by time of arrival and order of sending.
+    flying: BTreeMap<(Instant, u64), (usize, Vec<u8>)>,
     order: u64,
     /// State of each sender: bytes since its last delimiter, and time when its link becomes idle.
     lines: Vec<(Vec<u8>, Instant)>,
@@ -57,7 +37,7 @@ impl Medium {
             faults,
             rng: ChaCha8Rng::seed_from_u64(seed),
             injected: Injected::default(),
-            flying: BinaryHeap::new(),
+            flying: BTreeMap::new(),
             order: 0,
             lines: vec![(Vec::new(), now); senders],
         }
@@ -87,12 +67,9 @@ impl Medium {
             let arrivals = self.faults.inject(frame, &mut self.rng, &mut self.injected);
             for arrival in arrivals {
                 let late = u32::try_from(arrival.late).unwrap_or(u32::MAX);
-                self.flying.push(Reverse(Flying {
-                    at: arrives + wall(self.link.hop_time()).saturating_mul(late),
-                    order: self.order,
-                    receiver,
-                    bytes: arrival.bytes,
-                }));
+                let at = arrives + wall(self.link.hop_time()).saturating_mul(late);
+                let frame = (receiver, arrival.bytes);
+                self.flying.insert((at, self.order), frame);
                 self.order += 1;
             }
         }
@@ -103,13 +80,12 @@ impl Medium {
         if self.next()? > now {
             return None;
         }
-        let Reverse(flying) = self.flying.pop()?;
-        Some((flying.receiver, flying.bytes))
+        self.flying.pop_first().map(|(_, frame)| frame)
     }
 
     /// Returns the time of the next arrival, if any bytes are in transit.
     pub fn next(&self) -> Option<Instant> {
-        self.flying.peek().map(|Reverse(flying)| flying.at)
+        self.flying.keys().next().map(|(at, _)| *at)
     }
 
     /// Returns how many frames were lost, corrupted, duplicated and reordered so far.

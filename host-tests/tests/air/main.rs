@@ -11,8 +11,7 @@ mod medium;
 mod soak;
 mod table;
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 
 use uav_relay::{Duration, Instant};
 use uav_relay_sim::simulator::faults::LinkSpec;
@@ -23,7 +22,7 @@ struct Bench {
     medium: Medium,
     /// Receivers of each node: the nodes `hearers[n]` receive the frames of node n.
     hearers: Vec<Vec<usize>>,
-    due: BinaryHeap<Reverse<(Instant, u64, usize, u8)>>,
+    due: BTreeMap<(Instant, u64), AirEvent>,
     order: u64,
     /// Completed frames with their end times.
     sent: Vec<(Instant, Sent)>,
@@ -41,7 +40,7 @@ impl Bench {
         Self {
             medium: Medium::new(access, link, hearers.len(), seed),
             hearers,
-            due: BinaryHeap::new(),
+            due: BTreeMap::new(),
             order: 0,
             sent: Vec::new(),
         }
@@ -64,23 +63,17 @@ impl Bench {
 
     fn put(&mut self, agenda: Agenda) {
         for (at, event) in agenda {
-            let (node, kind) = match event {
-                AirEvent::Sense(node) => (node, 0),
-                AirEvent::Begin(node) => (node, 1),
-                AirEvent::End(node) => (node, 2),
-            };
-            self.due.push(Reverse((at, self.order, node, kind)));
+            self.due.insert((at, self.order), event);
             self.order += 1;
         }
     }
 
     /// Processes all channel events before `until`.
     fn go_on(&mut self, until: Instant) {
-        while let Some(Reverse((at, _, node, kind))) = self.due.peek().copied()
-            && at < until
+        while let Some(next) = self.due.first_entry()
+            && next.key().0 < until
         {
-            self.due.pop();
-            let event = [AirEvent::Sense, AirEvent::Begin, AirEvent::End][usize::from(kind)](node);
+            let ((at, _), event) = next.remove_entry();
             let mut agenda = Agenda::new();
             let hearers = |from: usize| self.hearers[from].clone();
             if let Some(sent) = self.medium.happen(at, event, hearers, &mut agenda) {

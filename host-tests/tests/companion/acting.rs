@@ -121,7 +121,7 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     let (status, number) = page.post("/preview", &json!({ "altitude": "50" }));
     assert_eq!((status, &number[..]), (200, "{\"preview\":1}"));
     let state = page.until("failed");
-    let why = "altitude 50 m: must be within 20 to 20 m (the relays' geofence, set before flight by --altitude and --band); farthest outside is relay 1, at altitude 50.0 m";
+    let why = "altitude 50 m: must be within 20 to 20 m (the relays' geofence, set before flight by --altitude and --band); every relay with a drone refuses it: farthest outside is relay 1, at altitude 50.0 m";
     assert_eq!(state["fault"], why);
     let request = json!({ "preview": 1, "digest": state["digest"] });
     assert_eq!(
@@ -225,6 +225,14 @@ fn random_previews_are_flown_as_they_were_shown() {
     let (count, seed) = (number("COUNT", 3), number("SEED", 1));
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut chain, station, page) = chain_with_page();
+    // Rx beyond the geofence: no relay would be outside, but the refusal names the limit and a relay.
+    assert_eq!(
+        page.post("/preview", &json!({ "receiver": "1010,0" })).0,
+        200
+    );
+    let fault = page.until("failed")["fault"].take();
+    let why = "distance 1010 m: must be within 0 to 1000 m (the relays' geofence, set before flight by --distance); every relay with a drone refuses it: nearest to the limit is relay 2, at x ";
+    assert!(fault.as_str().unwrap().starts_with(why), "{fault}");
     let (mut flown, mut refused) = (0, 0);
     while flown < count {
         let mut body = json!({ "interferer": format!(
@@ -257,11 +265,15 @@ fn random_previews_are_flown_as_they_were_shown() {
             });
         let state = state.unwrap();
         if state["stage"] == "failed" {
-            // The limit is named, and the relay that would be farthest outside, if its position is beyond a limit. Rx
-            // beyond the line of the loaded mission is refused by itself.
+            // The limit is named, and a relay: with Rx beyond the line of the loaded mission all positions are within it.
             let why = state["fault"].as_str().unwrap();
-            let names = body["altitude"].is_null() || why.contains("farthest outside is relay ");
-            assert!(why.contains("must be within") && names, "{body}: {why}");
+            let place = if body["altitude"].is_null() {
+                "nearest to the limit is relay 2, at x "
+            } else {
+                "farthest outside is relay 1, at altitude "
+            };
+            let names = why.contains("must be within") && why.contains(place);
+            assert!(names, "{body}: {why}");
             refused += 1;
             continue;
         }

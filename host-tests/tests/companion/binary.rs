@@ -1,4 +1,4 @@
-//! Programs under test, which Cargo is called to build because `cargo test -p host-tests` does not.
+//! Programs under test. Cargo is called to build them because `cargo test -p host-tests` does not.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -7,25 +7,37 @@ use std::sync::OnceLock;
 /// Returns the path of the companion program, which is built with the tests' cargo profile.
 pub(crate) fn companion() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| build("uav-relay-linux", "linux_companion"))
+    PATH.get_or_init(|| program("uav-relay-linux", "linux_companion"))
 }
 
 pub(crate) fn ground() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| build("uav-relay-linux", "linux_ground"))
+    PATH.get_or_init(|| program("uav-relay-linux", "linux_ground"))
 }
 
 pub(crate) fn plan() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| build("uav-relay-tools", "plan"))
+    PATH.get_or_init(|| program("uav-relay-tools", "plan"))
 }
 
 pub(crate) fn provision() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| build("uav-relay-tools", "provision"))
+    PATH.get_or_init(|| program("uav-relay-tools", "provision"))
 }
 
-fn build(package: &str, program: &str) -> PathBuf {
+pub(crate) fn decode() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| program("uav-relay-decode", "decode"))
+}
+
+/// Returns the path of a program.
+///
+/// Builds the program, unless the variable `PROGRAMS` is set: then `cargo ci` has built it together with these tests.
+fn program(package: &str, program: &str) -> PathBuf {
+    if std::env::var_os("PROGRAMS").is_some() {
+        let own = std::env::current_exe().unwrap();
+        return own.ancestors().nth(2).unwrap().join(program);
+    }
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = manifest.parent().expect("the workspace is one up");
     // The target folder of these tests avoids a second build. Cargo holds no lock on it while tests run.

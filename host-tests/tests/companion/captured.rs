@@ -8,6 +8,7 @@ use std::time::Duration;
 use serde_json::Value;
 use uav_relay_scenario::Scenario;
 
+use crate::binary::decode;
 use crate::chain::{Chain, simulated};
 use crate::medium::QUIET;
 use crate::process::Relay;
@@ -18,9 +19,8 @@ type FrameId = (u64, u64, u64);
 
 /// Returns the frames in a capture file with their directions. The first frame may be partial.
 fn frames(file: &Path) -> Vec<(String, FrameId)> {
-    let output = Command::new("cargo")
-        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-        .args(["decode", "--json"])
+    let output = Command::new(decode())
+        .arg("--json")
         .arg(file)
         .output()
         .unwrap();

@@ -134,7 +134,7 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     bench.agreed();
     let more = "--new-altitude 50 --new-band 50,50 --yes";
     let (ended, error) = bench.uploads("1", more).fails(1);
-    let line = "upload of version 1 refused: altitude 50 m: must be within 20 to 40 m (the relays' geofence, set before flight by --altitude and --band); farthest outside is relay 1, at altitude 50.0 m; --no-fence uploads the mission nevertheless";
+    let line = "upload of version 1 refused: altitude 50 m: must be within 20 to 40 m (the relays' geofence, set before flight by --altitude and --band); every relay with a drone refuses it: farthest outside is relay 1, at altitude 50.0 m; --no-fence uploads the mission nevertheless";
     assert_eq!(error, line);
     assert_eq!(
         lines_of_event(&ended, "change")[0],

@@ -1,13 +1,18 @@
 //! Script of faults of eight flying relays, each with its alarm on the station's page.
 //!
+//! An alarm about a relay without a fault is a failure, with two exceptions. Relays without enough others lose their lease, and may
+//! lack a quorum: such an alarm must be true in the relay's own state, as its status socket and its log tell it.
+//!
 //! `COUNT=30 cargo test --test companion reported::the_page_shows_eight -- --nocapture` runs all of them and prints their times.
 
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::chain::Chain;
+use crate::files::status_within;
 use crate::process::LIMIT;
 use crate::reported::{Flown, Page, alarms, relays, restart};
 
@@ -17,11 +22,27 @@ const FEW: usize = 7;
 /// Longest permitted time from the chain's own detection of a fault to the alarm, s.
 const SOON_S: f64 = 2.0;
 
+/// Shortest silence of a relay after which the station misses its reports, s.
+const SILENT_S: f64 = 5.0;
+
 /// Time after which the station notices that a relay's reports are missing, s. The reports may have gone through another lost relay.
 const LOST_S: f64 = 10.0;
 
 /// Time after which a fault that neither a companion nor the page has noticed is a failure.
 const MOST: Duration = Duration::from_secs(90);
+
+/// Time without a lease after which the page shows an alarm, s.
+const EXPIRED_S: f64 = 5.0;
+
+/// Longest time between a relay's own state and the report of it, and between two queries of that state, s.
+const NEAR_S: f64 = 2.0;
+
+/// Longest wait for a snapshot of the page between two queries of relays' states.
+const STEP: Duration = Duration::from_millis(20);
+
+const LEASE: &str = ": last agreement on positions expired";
+
+const NO_QUORUM: &str = "no quorum: ";
 
 /// Fault: the command that causes it, the relay, the alarm, and a log line. Relay 0 stands for the whole chain. The log line is from a
 /// companion that has noticed the fault. `#` stands for the relay's number.
@@ -103,7 +124,7 @@ const SCRIPT: [&[Fault]; 14] = [
         "warning relay # has another mission",
         "relay # has another mission",
     )],
-    &[("no quorum", 0, "critical no quorum", "no quorum  ")],
+    &[("no quorum", 0, "critical no quorum", "no quorum: ")],
 ];
 
 /// Prints the times from each fault until a companion notices it, and until its alarm, s. Returns a text for each late alarm.
@@ -112,13 +133,13 @@ fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
     for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(times) {
         let own_s = own.map_or("not before the alarm".to_owned(), |it| format!("{it:.1} s"));
         println!("{what} {relay}: noticed by a companion: {own_s}; alarm: {shown:.1?} s");
-        // The neighbours give a lost relay up later than the station misses its reports.
-        let most_s = if *alarm == LOST {
-            LOST_S
+        // The neighbours give a lost relay up later than the station misses its reports. But they notice an old epoch earlier.
+        let [least_s, most_s] = if *alarm == LOST {
+            [SILENT_S, LOST_S]
         } else {
-            MOST.as_secs_f64()
+            [0.0, MOST.as_secs_f64()]
         };
-        let noticed_s = own.unwrap_or(most_s).min(most_s);
+        let noticed_s = own.unwrap_or(most_s).clamp(least_s, most_s);
         let is_soon = shown.is_some_and(|shown| shown <= noticed_s + SOON_S);
         if !is_soon {
             failures.push(format!(
@@ -129,16 +150,121 @@ fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
     failures
 }
 
+/// State of a relay by its own status and log, since the begin of the present group of faults.
+#[derive(Clone, Debug, Default)]
+struct Own {
+    /// Times of the queries of its status, s, each with true if the relay had an agreed position but no lease.
+    leaseless: Vec<(f64, bool)>,
+    /// True if the relay has logged that it has no quorum.
+    lacks_quorum: bool,
+}
+
+impl Own {
+    /// Returns true if the relay had no lease for most of the time before an alarm, which is based on its report of the time `at_s`.
+    fn has_expired(&self, at_s: f64) -> bool {
+        let before = |span_s: f64| {
+            let all = self.leaseless.iter();
+            all.filter(move |(then_s, _)| (at_s - span_s..at_s + NEAR_S).contains(then_s))
+        };
+        let of = |span_s| before(span_s).filter(|(_, is)| *is).count();
+        of(NEAR_S) > 0 && 2 * of(EXPIRED_S) > before(EXPIRED_S).count()
+    }
+
+    /// Returns the longest time without a lease, s.
+    fn longest_s(&self) -> f64 {
+        let runs = self.leaseless.chunk_by(|one, next| one.1 == next.1);
+        let lost = runs.filter(|run| run[0].1);
+        lost.map(|run| run[run.len() - 1].0 - run[0].0)
+            .fold(0.0, f64::max)
+    }
+}
+
 /// Test setup: the relays of a chain with their drones, and the web page of the ground station.
 pub(crate) struct Stage {
     pub(crate) chain: Chain,
     pub(crate) flown: Vec<Flown>,
-    pub(crate) page: Page,
+    page: Page,
+    begun: Instant,
+    own: Vec<Own>,
+    /// Number of queries of a relay's own state.
+    queries: usize,
+    /// Alarms about a relay's own state that its own state contradicts.
+    untrue: BTreeSet<String>,
+    /// True if the page has had an alarm that a lease has expired.
+    has_expired: bool,
 }
 
 impl Stage {
-    pub(crate) const fn new(chain: Chain, flown: Vec<Flown>, page: Page) -> Self {
-        Self { chain, flown, page }
+    pub(crate) fn new(chain: Chain, flown: Vec<Flown>, page: Page) -> Self {
+        Self {
+            own: vec![Own::default(); flown.len()],
+            chain,
+            flown,
+            page,
+            begun: Instant::now(),
+            queries: 0,
+            untrue: BTreeSet::new(),
+            has_expired: false,
+        }
+    }
+
+    fn took_s(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// Queries the state of one relay, the next one at each call, and returns the new log lines of all relays, with their numbers.
+    fn query(&mut self) -> Vec<(usize, String)> {
+        let at = self.queries % self.flown.len();
+        self.queries += 1;
+        let socket = self.chain.files.path(&format!("status{}", at + 1));
+        if let Some(said) = status_within(socket, Duration::from_millis(200)) {
+            let it = &said["relay"];
+            assert!(it["has_lease"].is_boolean(), "{said:#}");
+            let is = it["has_lease"] == false && !it["setpoint"].is_null();
+            let took_s = self.took_s();
+            self.own[at].leaseless.push((took_s, is));
+        }
+        let mut lines = Vec::new();
+        for ((number, it), own) in (1..).zip(&mut self.flown).zip(&mut self.own) {
+            for line in it.relay.lines_with("") {
+                own.lacks_quorum |= line.contains("no quorum: ");
+                lines.push((number, line));
+            }
+        }
+        lines
+    }
+
+    /// Waits for the next snapshot of the page, at most for `limit`. Compares its alarms about the relays' own states with these
+    /// states. Returns false if none has arrived.
+    fn judge(&mut self, limit: Duration) -> bool {
+        if !self.page.arrives(limit) {
+            return false;
+        }
+        let now_s = self.took_s();
+        for alarm in alarms(&self.page.last) {
+            let (_, text) = alarm.split_once(' ').unwrap();
+            let is_lease = text.contains(LEASE);
+            self.has_expired |= is_lease;
+            let Some(by) = text.strip_prefix(NO_QUORUM).or(is_lease.then_some(text)) else {
+                continue;
+            };
+            for number in subjects(by) {
+                let shown = &relays(&self.page.last)[number - 1];
+                let own = &self.own[number - 1];
+                let age_s = shown["age_s"].as_f64().unwrap();
+                let is_true = if is_lease {
+                    own.has_expired(now_s - age_s)
+                } else {
+                    own.lacks_quorum
+                };
+                if !is_true && self.untrue.insert(format!("relay {number}: {text}")) {
+                    println!(
+                        "  untrue, {now_s:.1} s, relay {number}, age {age_s} s: {text}: {own:?}"
+                    );
+                }
+            }
+        }
+        true
     }
 
     /// Runs the groups of faults of the script. The environment variable COUNT limits their number; ONLY selects groups by number, from 0.
@@ -169,6 +295,11 @@ impl Stage {
         let number = |it: &Value| it["number"].as_u64().unwrap();
         let all = |it: &Value| it["alarms"].as_array().unwrap().clone();
         let known = all(&self.page.last).iter().map(number).max().unwrap_or(0);
+        // Log lines of earlier groups are not counted.
+        self.query();
+        self.begun = Instant::now();
+        self.own.fill(Own::default());
+        self.has_expired = false;
         for (what, relay, ..) in group {
             self.begin(what, *relay);
         }
@@ -183,21 +314,18 @@ impl Stage {
             (None, None) => begun.elapsed() < MOST,
         };
         while times.iter().any(is_open) {
-            for (at, it) in self.flown.iter_mut().enumerate() {
+            for (number, line) in self.query() {
                 let took = begun.elapsed().as_secs_f64();
-                for line in it.relay.lines_with("") {
-                    for (fault, [own, _]) in group.iter().zip(&mut times) {
-                        let part = of(fault, fault.3);
-                        let is_its =
-                            part.starts_with("relay ") != (fault.1 == at + 1) || fault.1 == 0;
-                        if is_its && line.contains(&part) {
-                            own.get_or_insert(took);
-                        }
+                for (fault, [own, _]) in group.iter().zip(&mut times) {
+                    let part = of(fault, fault.3);
+                    let is_its = part.starts_with("relay ") != (fault.1 == number) || fault.1 == 0;
+                    if is_its && line.contains(&part) {
+                        own.get_or_insert(took);
                     }
-                    story.push(format!("{took:.1} {line}"));
                 }
+                story.push(format!("{took:.1} {line}"));
             }
-            if self.page.arrives(Duration::from_millis(20)) {
+            if self.judge(STEP) {
                 let (took, lasting) = (begun.elapsed().as_secs_f64(), alarms(&self.page.last));
                 for (fault, [_, shown]) in group.iter().zip(&mut times) {
                     if lasting.iter().any(|it| is_of(it, &text(fault))) {
@@ -220,14 +348,16 @@ impl Stage {
         // An alarm that comes and goes would do so now.
         let held = Instant::now();
         while held.elapsed() < Duration::from_secs(1) {
-            self.page.next();
+            self.query();
+            self.judge(STEP);
         }
         for (what, relay, ..) in group {
             self.end(what, *relay);
         }
         let ended = Instant::now();
         while !alarms(&self.page.last).is_empty() && ended.elapsed() < LIMIT {
-            self.page.next();
+            self.query();
+            self.judge(STEP);
         }
         println!("  all alarms ended after {:.1?}", ended.elapsed());
         let new: Vec<Value> = all(&self.page.last)
@@ -243,12 +373,28 @@ impl Stage {
                 failures.push(format!("{group:?}: does not end: {it}"));
             }
         }
-        let hurt: Vec<u64> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
+        let hurt: Vec<usize> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
+        // With both ends or most relays lost, the rest of the chain has no lease for a while, and may have no quorum.
+        let is_torn =
+            group.iter().filter(|it| it.0 == "kill").count() > 1 || group[0].0 == "no quorum";
         for it in &new {
             let text = it["text"].as_str().unwrap();
-            if subject(text).is_some_and(|it| !hurt.contains(&it)) {
+            let by = text.strip_prefix(NO_QUORUM);
+            let is_own = by.is_some() || text.contains(LEASE);
+            let others = subjects(by.unwrap_or(text)).any(|it| !hurt.contains(&it));
+            if others && !(is_own && is_torn) {
                 failures.push(format!("{group:?}: a relay without a fault: {text}"));
             }
+        }
+        let untrue = std::mem::take(&mut self.untrue).into_iter();
+        failures.extend(untrue.map(|it| format!("{group:?}: untrue: {it}")));
+        let longest_s: Vec<f64> = self.own.iter().map(Own::longest_s).collect();
+        println!("  longest times without a lease, by the relays: {longest_s:.1?} s");
+        let most_s = longest_s.into_iter().fold(0.0, f64::max);
+        if most_s > EXPIRED_S + SOON_S + NEAR_S && !self.has_expired {
+            failures.push(format!(
+                "{group:?}: no lease for {most_s:.1} s, but no alarm"
+            ));
         }
         for fault in group {
             let of = |it: &&Value| {
@@ -358,8 +504,9 @@ impl Stage {
             self.order(relay, order);
             let until = Instant::now() + Duration::from_millis([1_300, 3_000][turn % 2]);
             while Instant::now() < until {
-                let (_, snapshot) = self.page.next();
-                let shown = &relays(&snapshot)[relay - 1];
+                self.query();
+                self.judge(STEP);
+                let shown = &relays(&self.page.last)[relay - 1];
                 let is_new = shown["age_s"].as_f64().is_some_and(|it| it < 2.0);
                 if turn % 2 == 1 && is_new && shown["control"] == "engaged" {
                     return;
@@ -382,18 +529,30 @@ impl Stage {
 }
 
 /// Returns the numbers of the relays that the fault `what` concerns.
-fn hurt(what: &str, relay: usize) -> std::ops::RangeInclusive<u64> {
+fn hurt(what: &str, relay: usize) -> std::ops::RangeInclusive<usize> {
     match what {
         "no quorum" => 4..=8,
-        _ => relay as u64..=relay as u64,
+        _ => relay..=relay,
     }
 }
 
-/// Returns the relay that an alarm is about; `None` if it is about the whole chain.
-fn subject(text: &str) -> Option<u64> {
-    let rest = text.strip_prefix("relay ")?;
-    let end = rest.find(|it: char| !it.is_ascii_digit());
-    rest[..end.unwrap_or(rest.len())].parse().ok()
+/// Returns the relays with which a text begins ("relay 3", "relays 1, 2 and 5 to 7"); none if the text is about the whole chain.
+fn subjects(text: &str) -> impl Iterator<Item = usize> {
+    let words = text.strip_prefix("relays ").or(text.strip_prefix("relay "));
+    let (mut numbers, mut is_range) = (BTreeSet::new(), false);
+    for word in words.unwrap_or_default().split(' ') {
+        match word.trim_end_matches([',', ':', ';']).parse() {
+            Ok(number) if is_range => numbers.extend(numbers.last().copied().unwrap()..=number),
+            Ok(number) => _ = numbers.insert(number),
+            Err(_) if word == "and" || word == "to" => {}
+            Err(_) => break,
+        }
+        is_range = word == "to";
+        if word.ends_with([':', ';']) {
+            break;
+        }
+    }
+    numbers.into_iter()
 }
 
 /// Returns true if an alarm begins with `start` and no digit follows. So an alarm about relay 10 is not taken for one about relay 1.

@@ -6,6 +6,7 @@ use std::net::Shutdown;
 use std::os::unix::fs::PermissionsExt as _;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rustix::fs::{CWD, Mode, mkfifoat};
 use serde_json::Value;
@@ -91,6 +92,16 @@ pub(crate) fn answer(socket: impl AsRef<Path>, request: &str, is_whole: bool) ->
 pub(crate) fn status_of(socket: impl AsRef<Path>) -> Value {
     let text = answer(socket, "", true);
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
+}
+
+/// Returns the status answer of a process's socket; `None` if the process does not answer within `limit`.
+pub(crate) fn status_within(socket: impl AsRef<Path>, limit: Duration) -> Option<Value> {
+    let mut stream = UnixStream::connect(&socket).ok()?;
+    stream.set_read_timeout(Some(limit)).unwrap();
+    let _ = stream.shutdown(Shutdown::Write);
+    let mut text = String::new();
+    stream.read_to_string(&mut text).ok()?;
+    serde_json::from_str(&text).ok()
 }
 
 /// Queries the status of a process until `is_so` is true for the status. Returns that status.

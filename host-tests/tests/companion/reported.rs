@@ -181,7 +181,9 @@ pub(crate) fn fly(chain: &Chain, index: usize, x_m: f64) -> Flown {
 pub(crate) fn restart(chain: &Chain, index: usize, more: &str) -> Relay {
     let options = options(&chain.files.text(&format!("autopilot{index}")));
     let signed = chain.files.signed("key", &format!("epoch{index}"));
-    chain.relay(index, &format!("{options} {signed} {more}"))
+    let status = chain.files.text(&format!("status{index}"));
+    let own = format!("{options} {signed} --status-socket {status} {more}");
+    chain.relay(index, &own)
 }
 
 pub(crate) fn station(chain: &Chain, tty: &str) -> Relay {

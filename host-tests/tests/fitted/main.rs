@@ -1,12 +1,6 @@
 //! Fitted slots (each as long as its hop needs) by the joint method, compared with the planner.
 //!
 //! `COUNT` and `SEED` in the environment set the number of scenes and the first seed.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation,
-    missing_docs
-)]
 
 mod flown;
 mod scenes;

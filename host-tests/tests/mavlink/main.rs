@@ -1,4 +1,4 @@
-//! MAVLink codec compared with two independent ones, in both directions, and with noise.
+//! MAVLink codec compared with independent ones, in both directions, and with noise.
 
 #![cfg(target_os = "linux")]
 

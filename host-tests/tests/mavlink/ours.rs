@@ -1,8 +1,6 @@
-//! Companion's messages, read by other codecs.
+//! Companion's messages, read by another codec. The vehicles of `--test autopilot` read them by a third one.
 
 use host_tests::python;
-use mavlink::dialects::common::MavMessage;
-use mavlink::{MavlinkReader, MavlinkVersion};
 use serde_json::Value;
 use uav_relay::Geodetic;
 use uav_relay::flight::mavlink::outgoing::{Outgoing, severity};
@@ -211,83 +209,6 @@ fn pymavlink_reads_every_field_of_our_messages() {
                 assert_eq!(fields["name"].as_str().unwrap(), cut(name, 10));
                 assert_eq!(float("value"), value);
             }
-        }
-    }
-}
-
-#[test]
-fn the_mavlink_crate_reads_every_field_of_our_messages() {
-    for (message, number, bytes) in framed() {
-        let mut reader = MavlinkReader::new(&bytes[..]);
-        let (header, read) = reader
-            .read_message::<MavMessage>(MavlinkVersion::V2)
-            .unwrap();
-        assert_eq!(
-            (header.system_id, header.component_id, header.sequence),
-            (7, 191, number)
-        );
-        match (message, read) {
-            (Outgoing::Heartbeat, MavMessage::HEARTBEAT(said)) => {
-                assert_eq!((said.mavtype as u32, said.autopilot as u32), (18, 8));
-                assert_eq!((said.custom_mode, said.mavlink_version), (0, 3));
-            }
-            (
-                Outgoing::CommandAck {
-                    command, result, ..
-                },
-                MavMessage::COMMAND_ACK(said),
-            ) => {
-                assert_eq!(said.command as u32, u32::from(command));
-                assert_eq!(said.result as u32, u32::from(result));
-            }
-            (Outgoing::SetMessageInterval { id, interval_us }, MavMessage::COMMAND_LONG(said)) => {
-                assert_eq!(said.command as u32, 511);
-                assert_eq!((said.target_system, said.target_component), (7, 1));
-                assert_eq!((said.param1, said.param2), (id as f32, interval_us as f32));
-            }
-            (
-                Outgoing::SetPosition {
-                    boot_ms,
-                    at,
-                    velocity_m_s,
-                    yaw_rad,
-                },
-                MavMessage::SET_POSITION_TARGET_GLOBAL_INT(said),
-            ) => {
-                assert_eq!(
-                    (said.time_boot_ms, said.lat_int, said.lon_int),
-                    (boot_ms, at.lat_e7, at.lon_e7)
-                );
-                assert_eq!(said.alt, at.amsl_mm as f32 / 1e3);
-                assert_eq!(
-                    [said.vx, said.vy, said.vz],
-                    velocity_m_s.unwrap_or_default()
-                );
-                assert_eq!(said.yaw, yaw_rad.unwrap_or_default());
-                let mask = mask(velocity_m_s.is_some(), yaw_rad.is_some());
-                assert_eq!(said.type_mask.bits(), mask);
-                assert_eq!(said.coordinate_frame as u32, 5);
-                assert_eq!((said.target_system, said.target_component), (7, 1));
-            }
-            (Outgoing::TimeSync { asked }, MavMessage::TIMESYNC(said)) => {
-                assert_eq!((said.tc1, said.ts1), (0, asked.cast_signed()));
-            }
-            (Outgoing::StatusText { severity, text }, MavMessage::STATUSTEXT(said)) => {
-                assert_eq!(said.severity as u32, u32::from(severity));
-                assert_eq!(said.text.to_str().unwrap(), cut(text, 50));
-            }
-            (
-                Outgoing::NamedValue {
-                    boot_ms,
-                    name,
-                    value,
-                },
-                MavMessage::NAMED_VALUE_FLOAT(said),
-            ) => {
-                assert_eq!((said.time_boot_ms, said.value), (boot_ms, value));
-                assert_eq!(said.name.to_str().unwrap(), cut(name, 10));
-            }
-            (message, read) => panic!("{message:?} was read as {read:?}"),
         }
     }
 }

@@ -25,9 +25,7 @@ use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::scene::Scene;
-use uav_relay_scenario::{
-    AirGround, ChannelSpec, Interference, Noise, RelayOverride, Scenario, Source,
-};
+use uav_relay_scenario::{AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sources {
@@ -69,21 +67,10 @@ pub(crate) fn scenario(
         d / f64::from(n) * log_uniform(rng, 0.03, 1.0)
     };
     let scenario = Scenario {
-        line: None,
-        listen: None,
-        link: None,
-        reverse: 0.0,
-        areas: std::collections::BTreeMap::new(),
-        masts_m: std::collections::BTreeMap::new(),
-        no_fly: Vec::new(),
-        terrain: None,
-        plan: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: altitude_m,
         altitude_max_m,
-        lateral_min_m: 0.0,
-        lateral_max_m: 0.0,
         min_separation_m,
         tx_w: uav_w * log_uniform(rng, 0.3, 100.0),
         rx_w: uav_w,
@@ -94,8 +81,8 @@ pub(crate) fn scenario(
             ..ChannelSpec::default()
         },
         interference: Interference::Sources(sources),
-        noise: Noise::default(),
         relays,
+        ..Scenario::default()
     };
     (scenario, n)
 }

@@ -1,7 +1,5 @@
 //! Plans with altitudes and lateral offsets, compared with agreements and the reference optimiser.
 
-use std::collections::BTreeMap;
-
 use host_tests::placing::{profile_of, reference};
 use uav_relay::{Method, Profile};
 use uav_relay_oracle::random::joint::Scenario as Drawn;
@@ -70,15 +68,6 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     let waves = link.mu_los.sqrt();
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     Scenario {
-        line: None,
-        listen: None,
-        link: None,
-        reverse: 0.0,
-        areas: BTreeMap::new(),
-        masts_m: BTreeMap::new(),
-        no_fly: Vec::new(),
-        terrain: None,
-        plan: None,
         distance_m: link.distance_m,
         altitude_m: corridor.least_m,
         altitude_min_m: corridor.least_m,
@@ -100,8 +89,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
             x_m: link.x_i,
             y_m: link.y_i,
         }]),
-        noise: uav_relay_scenario::Noise::default(),
-        relays: BTreeMap::new(),
+        ..Scenario::default()
     }
 }
 

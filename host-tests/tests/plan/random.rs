@@ -77,15 +77,6 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         BTreeMap::new()
     };
     Scenario {
-        line: None,
-        listen: None,
-        link: None,
-        reverse: 0.0,
-        areas: BTreeMap::new(),
-        masts_m: BTreeMap::new(),
-        no_fly: Vec::new(),
-        terrain: None,
-        plan: None,
         distance_m: d,
         altitude_m,
         altitude_min_m: round((altitude_m * rng.random_range(0.5..1.0)).max(0.2)).min(altitude_m),
@@ -105,8 +96,8 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
             ..ChannelSpec::default()
         },
         interference,
-        noise: uav_relay_scenario::Noise::default(),
         relays,
+        ..Scenario::default()
     }
 }
 

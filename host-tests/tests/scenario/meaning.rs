@@ -44,15 +44,6 @@ fn every_key_sets_its_value() {
         power_w = 4
     ";
     let expected = Scenario {
-        line: None,
-        listen: None,
-        link: None,
-        reverse: 0.0,
-        areas: BTreeMap::new(),
-        no_fly: Vec::new(),
-        terrain: None,
-        masts_m: BTreeMap::new(),
-        plan: None,
         distance_m: 1500.0,
         altitude_m: 25.0,
         altitude_min_m: 20.0,
@@ -98,6 +89,7 @@ fn every_key_sets_its_value() {
                 },
             ),
         ]),
+        ..Scenario::default()
     };
     assert_eq!(parse(text).unwrap(), expected);
 }

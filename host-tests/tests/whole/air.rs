@@ -1,7 +1,6 @@
 //! Event-driven medium on the public interface of `Relay`. It has one-way links, and reboots with stored votes.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use chacha20::ChaCha8Rng;
@@ -82,29 +81,6 @@ enum QueuedEvent {
 }
 
 #[derive(Debug)]
-struct Entry(u64, u64, QueuedEvent);
-
-impl PartialEq for Entry {
-    fn eq(&self, other: &Self) -> bool {
-        (self.0, self.1) == (other.0, other.1)
-    }
-}
-
-impl Eq for Entry {}
-
-impl PartialOrd for Entry {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Entry {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        (self.0, self.1).cmp(&(other.0, other.1))
-    }
-}
-
-#[derive(Debug)]
 struct Drone {
     relay: Relay,
     is_on: bool,
@@ -122,7 +98,8 @@ struct Drone {
 pub(crate) struct Air {
     kind: Kind,
     drones: Vec<Drone>,
-    queue: BinaryHeap<Reverse<Entry>>,
+    /// Pending events, by time, µs, and order of insertion.
+    queue: BTreeMap<(u64, u64), QueuedEvent>,
     order: u64,
     pub(crate) now_us: u64,
     cuts: Vec<u16>,
@@ -196,7 +173,7 @@ impl Air {
         Self {
             kind,
             drones,
-            queue: BinaryHeap::new(),
+            queue: BTreeMap::new(),
             order: 0,
             now_us: 0,
             cuts: vec![0; all * all],
@@ -222,7 +199,7 @@ impl Air {
     }
 
     fn put(&mut self, at_us: u64, event: QueuedEvent) {
-        self.queue.push(Reverse(Entry(at_us, self.order, event)));
+        self.queue.insert((at_us, self.order), event);
         self.order += 1;
     }
 
@@ -231,12 +208,10 @@ impl Air {
     }
 
     pub(crate) fn run(&mut self, until_us: u64) {
-        while let Some(Reverse(Entry(at_us, ..))) = self.queue.peek()
-            && *at_us <= until_us
+        while let Some(next) = self.queue.first_entry()
+            && next.key().0 <= until_us
         {
-            let Some(Reverse(Entry(at_us, _, happening))) = self.queue.pop() else {
-                break;
-            };
+            let ((at_us, _), happening) = next.remove_entry();
             self.now_us = at_us;
             let touched = match happening {
                 QueuedEvent::Wake(at) => {

@@ -286,7 +286,11 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen = seen.take();
     println!("relay {own}: the setpoint moved by {seen:?}");
     for cause in expected {
-        assert!(seen.get(cause).is_some_and(|&count| count > 5), "{cause}");
+        let count = seen.get(cause).copied().unwrap_or(0);
+        assert!(
+            count > 5,
+            "relay {own}: {count} changes by \"{cause}\", at least 6 are needed: draw more (config)"
+        );
     }
 }
 

@@ -142,6 +142,8 @@ proptest! {
 fn random_bodies_reach_messages_and_both_errors() {
     /// Index under which message bodies without a known tag are counted: the first unused tag.
     const NONE: usize = 23;
+    /// Tags of messages in which all, or nearly all, numbers have the range "any".
+    const ANY_NUMBER: [usize; 5] = [2, 3, 15, 16, 21];
 
     let mut runner = TestRunner::new(config(1));
     // Counts for each tag: valid, wrongly encoded, out of range.
@@ -158,11 +160,11 @@ fn random_bodies_reach_messages_and_both_errors() {
     }
     println!("{seen:?}");
     for (tag, [good, encoding, value]) in seen.into_iter().enumerate() {
-        assert!(encoding > 50, "{tag}");
-        assert!(good > 50 || tag == NONE, "{tag}");
+        assert!(encoding > 50, "tag {tag}: {encoding} wrongly encoded");
+        assert!(good > 50 || tag == NONE, "tag {tag}: {good} valid");
         assert!(
-            value > 5 || [2, 3, 15, 16, 21, NONE].contains(&tag),
-            "{tag}"
+            value > 5 || tag == NONE || ANY_NUMBER.contains(&tag),
+            "tag {tag}: {value} out of range; add the tag to ANY_NUMBER if (nearly) all numbers of the message have the range any"
         );
     }
 }

@@ -1,13 +1,9 @@
 //! `cargo plan` for interferers that may be anywhere in an area, and around no-fly areas.
+#![cfg(test)]
 #![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    clippy::too_many_lines,
-    missing_docs
+    clippy::too_many_lines
 )]
 
 use std::f64::consts::TAU;

@@ -1,11 +1,5 @@
 //! `cargo plan`, run as a program: table and JSON output.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -1,13 +1,9 @@
 //! `cargo plan` over terrain: the search for positions, and the program with elevation files.
+#![cfg(test)]
 #![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    clippy::too_many_lines,
-    missing_docs
+    clippy::too_many_lines
 )]
 
 #[path = "../../terrain/tests/terrain/files.rs"]

@@ -1,12 +1,7 @@
 //! Planned data rates are delivered: packets are sent through simulated chains.
 //!
 //! `COUNT` and `SEED` in the environment set the number of scenes and the first seed.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 use std::fmt::Write as _;
 

@@ -3,6 +3,3 @@
 pub mod stack;
 pub mod template;
 pub mod toolchain;
-
-/// Names of all fuzz targets, which `cargo ci` runs.
-pub const FUZZ_TARGETS: [&str; 6] = ["deframe", "frame", "relay", "chain", "scenario", "mavlink"];

@@ -11,6 +11,7 @@ use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
+use crate::wire::STATION_REACH;
 use crate::wire::message::Message;
 
 impl Node {
@@ -317,7 +318,7 @@ impl Node {
         let (own, all) = (self.member.node, self.member.all);
         let most = match self.member.settings.wiring {
             Wiring::Pair => 1,
-            Wiring::Shared => CANDIDATES,
+            Wiring::Shared => STATION_REACH,
         };
         let near = accepts_uploads(&self.member) && node.abs_diff(own) <= most;
         match node {

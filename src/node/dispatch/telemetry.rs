@@ -31,9 +31,9 @@ impl Node {
         self.reporting.handle_control(&self.member, control);
     }
 
-    /// Records that a frame of node `from` was received on the shared channel, whatever its destination.
-    pub(crate) fn on_channel(&mut self, now: Instant, from: u16) {
-        self.reporting.handle_frame(now, from);
+    /// Records that a frame of node `from` to node `to` was received on the shared channel.
+    pub(crate) fn on_channel(&mut self, now: Instant, from: u16, to: u16) {
+        self.reporting.handle_frame(now, &self.member, from, to);
     }
 
     /// Returns the next node to which a handshake must be sent, because no report of this node has arrived. `None` if

@@ -13,7 +13,8 @@ use embassy_stm32::usart::{
 use embassy_stm32::{Peri, Peripherals};
 use panic_probe as _;
 use relay_app::{BAUD, Buffers};
-use uav_relay_chip::clock::{self, ClockHardware, Clocks, Source};
+use uav_relay_chip::clock::{self, ClockHardware, Clocks, PLL_INPUT_HZ, Source};
+use uav_relay_chip::crystal::HSI_HZ;
 use uav_relay_chip::registers::Chip;
 use uav_relay_chip::reset::Reset;
 use uav_relay_chip::watchdog;
@@ -42,11 +43,9 @@ pub fn feed() {
 /// Returns Embassy's description of the clocks, which already run at `clocks`.
 fn tree(hardware: &ClockHardware, clocks: Clocks) -> rcc::Config {
     let mut config = rcc::Config::new();
-    let (Some(source), Some(crystal)) = (clocks.pll, hardware.crystal) else {
-        return config;
-    };
-    let prediv = match source {
-        Source::Crystal => {
+    let source_hz = match (clocks.pll, hardware.crystal) {
+        (None, _) => return config,
+        (Some(Source::Crystal), Some(crystal)) => {
             config.hse = Some(rcc::Hse {
                 freq: Hertz(crystal.hz),
                 mode: if crystal.bypass {
@@ -56,18 +55,16 @@ fn tree(hardware: &ClockHardware, clocks: Clocks) -> rcc::Config {
                 },
             });
             config.pll_src = rcc::PllSource::HSE;
-            rcc::PllPreDiv::DIV4
+            crystal.hz
         }
-        Source::Internal => rcc::PllPreDiv::DIV8,
+        (Some(_), _) => HSI_HZ,
     };
-    let mul = if clocks.core_hz == 180_000_000 {
-        rcc::PllMul::MUL180
-    } else {
-        rcc::PllMul::MUL168
-    };
+    let [divisor, ..] = (source_hz / PLL_INPUT_HZ).to_le_bytes();
+    // The core runs at half of the PLL's frequency.
+    let [low, high, ..] = (2 * clocks.core_hz / PLL_INPUT_HZ).to_le_bytes();
     config.pll = Some(rcc::Pll {
-        prediv,
-        mul,
+        prediv: rcc::PllPreDiv::from_bits(divisor),
+        mul: rcc::PllMul::from_bits(u16::from_le_bytes([low, high])),
         divp: Some(rcc::PllPDiv::DIV2),
         divq: None,
         divr: None,

@@ -1,12 +1,8 @@
-//! Tests of the program `cargo decode`: live input, noise, keys, and a pipe that closes.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+//! `cargo decode`, run as a program: live input, noise, keys, and a pipe that closes.
+#![cfg(test)]
 
 mod document;
+mod envelope;
 mod files;
 mod live;
 

@@ -1,13 +1,8 @@
 //! Tests that `tshark` with the dissector shows the same names and values as `cargo decode`.
 //!
-//! The frames are random and damaged ones of every kind. Without `tshark` the tests fail and say how to install it.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
+//! Without `tshark` these tests fail and say how to install it.
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 mod drawn;
 mod pdml;

@@ -7,8 +7,7 @@ mod judge;
 mod live;
 mod rotation;
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
@@ -665,56 +664,31 @@ pub enum QueuedEvent {
     Attack(AttackKind),
 }
 
-/// Event in the queue, with its time and relay. Events of the same time keep their order of insertion.
-#[derive(Clone, PartialEq, Eq, Debug)]
-struct Entry {
-    at: Instant,
-    order: u64,
-    relay: usize,
-    event: QueuedEvent,
-}
-
-impl Ord for Entry {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        (self.at, self.order).cmp(&(other.at, other.order))
-    }
-}
-
-impl PartialOrd for Entry {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-/// Queue of pending events, sorted by time.
+/// Queue of pending events, sorted by time. Events of the same time keep their order of insertion.
 #[derive(Debug, Default)]
 pub struct Queue {
-    entries: BinaryHeap<Reverse<Entry>>,
+    /// Relay and kind of each event, by time and order of insertion.
+    entries: BTreeMap<(Instant, u64), (usize, QueuedEvent)>,
     order: u64,
 }
 
 impl Queue {
     /// Adds the event `event` of relay `relay` (from 0) at the time `at`.
     pub fn put(&mut self, at: Instant, relay: usize, event: QueuedEvent) {
-        self.entries.push(Reverse(Entry {
-            at,
-            order: self.order,
-            relay,
-            event,
-        }));
+        self.entries.insert((at, self.order), (relay, event));
         self.order += 1;
     }
 
     /// Removes the earliest event and returns its time, relay (from 0) and kind; `None` if there is none.
     pub fn take(&mut self) -> Option<(Instant, usize, QueuedEvent)> {
-        let Reverse(entry) = self.entries.pop()?;
-        Some((entry.at, entry.relay, entry.event))
+        let ((at, _), (relay, event)) = self.entries.pop_first()?;
+        Some((at, relay, event))
     }
 
     /// Removes the earliest event, if its time is not after `until`. The result is as in [`take`](Self::take).
     pub fn take_by(&mut self, until: Instant) -> Option<(Instant, usize, QueuedEvent)> {
-        let Reverse(next) = self.entries.peek()?;
-        (next.at <= until).then(|| self.take())?
+        let (next, _) = *self.entries.keys().next()?;
+        (next <= until).then(|| self.take())?
     }
 }
 

@@ -1,12 +1,6 @@
 //! Command-line interface of `cargo chain`: options, JSON and exit statuses.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 mod capture;
 mod hostile;

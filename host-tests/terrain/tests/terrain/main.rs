@@ -1,16 +1,10 @@
 //! Tests of elevation files, profiles and diffraction losses.
+#![cfg(test)]
 #![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::cast_possible_truncation
-)]
-#![allow(
+    clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::float_cmp,
-    clippy::unreadable_literal,
-    missing_docs
+    clippy::unreadable_literal
 )]
 
 mod files;

@@ -2,14 +2,8 @@
 //!
 //! Each table is compared with a reference that shares no formula with the crate, or with values of a separate program.
 //! The tool runs once, in full; the tests read its files.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 mod altitudes;
 mod chains;

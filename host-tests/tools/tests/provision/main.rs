@@ -1,14 +1,6 @@
-//! Configuration of a drone.
-//!
-//! `cargo provision` writes it, the firmware's own code reads it, and damaged blocks are rejected.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    clippy::float_cmp,
-    missing_docs
-)]
+//! Configuration of a drone. `cargo provision` writes it, the firmware's own code reads it, and damaged blocks are rejected.
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 mod block;
 mod command;

@@ -6,11 +6,24 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use base64::Engine as _;
+use host_tests::python;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
 /// Longest wait for a condition on the page, chosen so that slow machines pass.
 const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Returns the code of axe-core, which finds faults of accessibility. The environment variable AXE names another copy.
+fn axe() -> String {
+    if let Ok(file) = std::env::var("AXE") {
+        return std::fs::read_to_string(file).unwrap();
+    }
+    let script = "import importlib.resources as r; print(r.files('axe_core_python').joinpath('axe.min.js').read_text())";
+    let mut python = Command::new(python::interpreter());
+    let output = python.args(["-c", script]).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
 
 pub(crate) struct Browser {
     process: Child,
@@ -185,6 +198,15 @@ impl Browser {
     pub(crate) fn accessible(&mut self) -> Vec<Value> {
         let tree = self.call("Accessibility.getFullAXTree", &json!({}));
         tree["nodes"].as_array().unwrap().clone()
+    }
+
+    /// Checks the page by all rules of axe-core. `what` describes the page.
+    pub(crate) fn passes_axe(&mut self, what: &str) {
+        self.run(&axe());
+        let faults = self.value(
+            "axe.run({ resultTypes: ['violations'] }).then((it) => it.violations.map((one) => `${one.impact} ${one.id}: ${one.nodes.map((node) => node.target).join()}`))",
+        );
+        assert_eq!(faults.to_string(), "[]", "axe-core, {what}");
     }
 
     pub(crate) fn key(&mut self, key: &str, code: u32) {

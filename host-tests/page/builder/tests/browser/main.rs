@@ -10,13 +10,7 @@
 //! | `recorded` | the page of a recorded flight |
 //! | `screen` | the screen of a flight, `cargo chain --fly --web` |
 //! | `layout` | wide and narrow, light and dark, accessibility, and response times |
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs
-)]
+#![cfg(test)]
 
 mod chromium;
 mod hand;

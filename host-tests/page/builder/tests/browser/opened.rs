@@ -84,9 +84,18 @@ fn native(browser: &mut Browser) -> String {
     let words = browser.text("window.last.words");
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), toml).unwrap();
-    let output = Command::new("cargo")
+    // With the variable `PROGRAMS` the program is built together with these tests.
+    let mut command = if std::env::var_os("PROGRAMS").is_some() {
+        let own = std::env::current_exe().unwrap();
+        Command::new(own.ancestors().nth(2).unwrap().join("chain"))
+    } else {
+        let mut cargo = Command::new("cargo");
+        cargo.arg("chain");
+        cargo
+    };
+    let output = command
         .current_dir(root())
-        .args(["chain", "--json", "--scenario"])
+        .args(["--json", "--scenario"])
         .arg(file.path())
         .args(words.split_whitespace())
         .output()

@@ -123,8 +123,13 @@ fn a_recorded_flight_is_played_from_a_file() {
 fn the_report_and_the_time_bar_fit_a_phone_and_a_wall() {
     let folder = tempfile::tempdir().unwrap();
     let (url, _) = recorded(folder.path(), "--kill 3@60 --soak 200");
-    for (width, height) in [(390, 844), (1920, 1080)] {
+    let sizes = [(390, 844), (1280, 900), (1920, 1080)];
+    let schemes = ["light", "dark"];
+    for ((width, height), scheme) in sizes.into_iter().flat_map(|it| schemes.map(|of| (it, of))) {
         let mut browser = Browser::start(&url, width, height);
+        if scheme == "dark" {
+            browser.prefer_dark();
+        }
         browser.until("document.readyState === 'complete' && map.frames > 0");
         browser.run("seek(150)");
         browser.until("map.pending === 0");
@@ -141,7 +146,8 @@ fn the_report_and_the_time_bar_fit_a_phone_and_a_wall() {
             bar.abs() < 1.0,
             "{width}: the time bar is {bar} px above the window's end"
         );
-        save(&width.to_string(), &browser.screenshot());
+        save(&format!("{width}-{scheme}"), &browser.screenshot());
+        browser.passes_axe(&format!("replay, {width} px, {scheme}"));
         assert_eq!(browser.errors(), Vec::<String>::new());
     }
 }

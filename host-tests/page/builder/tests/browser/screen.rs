@@ -455,6 +455,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     assert_eq!(browser.value("map.fitted"), true);
     task.reply(Err("no".to_owned()));
     save("desk", &browser.screenshot());
+    browser.passes_axe("preview of a mission");
     // The browser reports each refused request.
     let errors = browser.errors();
     assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
@@ -1075,10 +1076,8 @@ const FAINT: &str = r"(() => {
   return faint;
 })()";
 
-/// Checks contrast, names and keyboard focus of all elements of the page. The page shows an alarm of each urgency.
-///
-/// If the environment variable `AXE` names a copy of axe-core 4 (`axe.min.js`), the test also runs all rules of
-/// axe-core.
+/// Checks contrast, names and keyboard focus of all elements of the page, and all rules of axe-core. The page shows an
+/// alarm of each urgency.
 #[test]
 fn the_page_has_no_serious_fault_of_accessibility() {
     let alarm = |number, urgency, cleared_s| Alarm {
@@ -1101,8 +1100,8 @@ fn the_page_has_no_serious_fault_of_accessibility() {
         }],
         ..full(9, 3.0)
     });
-    let axe = std::env::var("AXE").map(|file| std::fs::read_to_string(file).unwrap());
-    for (width, is_dark) in [(1280, false), (1280, true), (390, false), (390, true)] {
+    let widths = [390, 1280, 1920];
+    for (width, is_dark) in widths.into_iter().flat_map(|it| [(it, false), (it, true)]) {
         let mut browser = shown.opened(width, 900);
         if is_dark {
             browser.prefer_dark();
@@ -1130,18 +1129,7 @@ fn the_page_has_no_serious_fault_of_accessibility() {
         }
         let in_order = browser.value("new Set(visited).size === visited.length && visited.every((it, at) => at === 0 || visited[at - 1].compareDocumentPosition(it) & 4) && visited.length");
         assert_eq!(in_order.as_u64(), Some(all), "{what}");
-        if let Ok(axe) = &axe {
-            browser.run(axe);
-            let faults = browser.value(
-                "axe.run({ resultTypes: ['violations'] }).then((it) => it.violations.map((one) => `${one.impact} ${one.id}: ${one.nodes.map((node) => node.target).join()}`))",
-            );
-            println!("axe-core, {what}: {faults}");
-            assert!(
-                !["serious", "critical"]
-                    .iter()
-                    .any(|it| faults.to_string().contains(it))
-            );
-        }
+        browser.passes_axe(&what);
         assert_eq!(browser.errors(), Vec::<String>::new());
     }
 }

@@ -104,6 +104,8 @@ fn prepare_fuzzer() -> Result<(), String> {
         "cargo-fuzz",
         "--version",
         CARGO_FUZZ_VERSION,
+        // The program only starts cargo and the targets: it need not be optimised.
+        "--debug",
         "--locked",
         "--root",
         "target/tools",

@@ -1,9 +1,8 @@
 //! Steps of `cargo ci`, in order.
 
 use std::io::{BufReader, Error, PipeReader, Write, pipe};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
-
-use uav_relay_xtask::FUZZ_TARGETS;
 
 use super::Evidence;
 
@@ -29,7 +28,16 @@ const SETS: [&str; 9] = [
     "telemetry",
 ];
 
-/// Integration tests of the quick check: seconds each, for every area of the project.
+/// Packages whose programs users build alone. A dependency may then lack a feature that another package enables.
+const PROGRAMS: [&str; 5] = [
+    "uav-relay-sim",
+    "uav-relay-tools",
+    "uav-relay-decode",
+    "uav-relay-linux",
+    "uav-relay-replay",
+];
+
+/// Integration tests of the quick check. They take seconds, and touch each area of the project.
 const QUICK_TESTS: [&str; 10] = [
     "asynch",
     "exact",
@@ -159,6 +167,12 @@ pub(crate) fn quick() -> Vec<Step> {
 pub(crate) fn all() -> Vec<Step> {
     let mut steps = first();
     steps.extend(clippy());
+    steps.extend(PROGRAMS.map(|package| {
+        step(
+            format!("programs of {package} alone"),
+            format!("cargo check -p {package} --bins --locked"),
+        )
+    }));
     steps.extend(workspace_tests());
     steps.push(step(
         "the commands of the pages",
@@ -217,41 +231,51 @@ const WAITING_TEST: &str = "companion";
 /// The number may exceed that of the cores, because each test uses a few per cent of a core.
 const WAITING_TESTS: &str = "6";
 
-/// Returns the steps that run all tests of the workspace.
+/// Returns the steps that build all programs and tests of the workspace, and run the tests.
+///
+/// All of them select the whole workspace. Cargo enables the features that any selected package needs of a dependency, so another
+/// selection compiles most packages once more.
 fn workspace_tests() -> Vec<Step> {
-    let chains: Vec<String> = integration_tests()
+    let others: Vec<String> = integration_tests()
         .into_iter()
         .filter(|test| test != WAITING_TEST)
         .map(|test| format!(" --test {test}"))
         .collect();
+    let test = "cargo test --workspace --no-fail-fast --locked";
     vec![
         step(
-            "tests",
-            "cargo test --workspace --exclude host-tests --no-fail-fast --locked",
+            "all programs and tests, built",
+            "cargo build --workspace --all-targets --locked",
         ),
         Step {
             lane: Lane::Waiting,
-            environment: &[("RUST_TEST_THREADS", WAITING_TESTS)],
+            environment: &[("PROGRAMS", "built"), ("RUST_TEST_THREADS", WAITING_TESTS)],
             ..step(
                 "tests of companions",
-                format!("cargo test -p host-tests --no-fail-fast --locked --test {WAITING_TEST}"),
+                format!("{test} --test {WAITING_TEST}"),
             )
         },
+        Step {
+            environment: &[("PROGRAMS", "built")],
+            ..step("tests", format!("{test} --lib --bins{}", others.concat()))
+        },
         step(
-            "tests of chains",
-            format!(
-                "cargo test -p host-tests --no-fail-fast --locked --lib{}",
-                chains.concat()
-            ),
+            "examples in the documentation",
+            "cargo test --workspace --no-fail-fast --locked --doc",
         ),
     ]
 }
 
-/// Returns the names of the integration tests of `host-tests`, sorted.
+/// Returns the names of all integration tests of the workspace, sorted.
 fn integration_tests() -> Vec<String> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests");
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> = entries
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let manifest = std::fs::read_to_string(root.join("Cargo.toml")).unwrap_or_default();
+    let (_, members) = manifest.split_once("members = [").unwrap_or_default();
+    let members = members.split(']').next().unwrap_or_default();
+    let mut names: Vec<String> = members
+        .split(',')
+        .map(|member| root.join(member.trim().trim_matches('"')).join("tests"))
+        .flat_map(|folder| std::fs::read_dir(folder).into_iter().flatten().flatten())
         .map(|entry| entry.path())
         .filter(|path| {
             path.extension().is_some_and(|end| end == "rs") || path.join("main.rs").is_file()
@@ -259,6 +283,7 @@ fn integration_tests() -> Vec<String> {
         .filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()))
         .collect();
     names.sort();
+    names.dedup();
     names
 }
 
@@ -334,8 +359,10 @@ fn embassy() -> Vec<Step> {
 
 /// Returns the step that tests the library and a simulated chain with the features in `set` only.
 ///
-/// `set` is a list with commas. The exhaustive model check of views depends on no feature, and takes most of the time
-/// of the library's tests. So it runs only without features and with all features.
+/// `set` is a list of features with commas between them.
+///
+/// The exhaustive model check of views depends on no feature and takes most of the time of the library's tests. It runs with no feature and
+/// with all features. The other tests take seconds, so that the library is not optimised for them.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
@@ -347,13 +374,16 @@ fn with_features(set: &str) -> Step {
         format!("tests and a flight, {set}")
     };
     let test = "cargo test -p uav-relay -p uav-relay-features --lib --tests --locked";
-    let without_model = if set.is_empty() {
-        ""
+    let (profile, without_model) = if set.is_empty() {
+        ("", "")
     } else {
-        " -- --skip one_sequence_of_views"
+        (
+            " --config profile.dev.package.uav-relay.opt-level=0 --config profile.dev.package.uav-relay.codegen-units=4",
+            " -- --skip one_sequence_of_views",
+        )
     };
     let command = format!(
-        "{test} --no-default-features --features={}{without_model}",
+        "{test}{profile} --no-default-features --features={}{without_model}",
         features.join(",")
     );
     step(name, command)
@@ -378,13 +408,23 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps for the nightly compiler: fuzz targets, and their corpora with Miri.
+/// Returns the names of the fuzz targets, sorted.
+fn fuzz_targets() -> Vec<String> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz/harness/fuzz_targets");
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let stem = |path: PathBuf| Some(path.file_stem()?.to_str()?.to_owned());
+    let mut names: Vec<String> = entries.filter_map(|entry| stem(entry.path())).collect();
+    names.sort();
+    names
+}
+
+/// Returns the steps that need the nightly compiler: all fuzz targets, and the fuzz corpora with Miri.
 ///
 /// Each fuzz target starts from its corpus, the stored inputs.
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
-    for target in FUZZ_TARGETS {
-        // New inputs go to this folder, not to the corpus. libFuzzer fails if the folder is missing.
+    for target in fuzz_targets() {
+        // Findings go to a folder that is not part of the corpus; libFuzzer fails if the folder does not exist.
         let found = format!("target/fuzz/{target}");
         _ = std::fs::create_dir_all(&found);
         let fuzz = format!(
@@ -403,7 +443,7 @@ fn nightly() -> Vec<Step> {
         ..step(
             "miri",
             format!(
-                "rustup run {NIGHTLY} cargo miri test -p host-tests --test fuzz --target armv7-unknown-linux-gnueabihf --target-dir target/miri"
+                "rustup run {NIGHTLY} cargo miri test -p uav-relay-fuzz --test fuzz --target armv7-unknown-linux-gnueabihf --target-dir target/miri"
             ),
         )
     });
@@ -412,7 +452,9 @@ fn nightly() -> Vec<Step> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Lane, Step, WAITING_TEST, all, integration_tests, quick, step};
+    use std::process::Command;
+
+    use super::{Lane, Step, WAITING_TEST, all, fuzz_targets, integration_tests, quick, step};
 
     #[test]
     fn a_failed_background_step_is_reported_with_its_output() {
@@ -437,13 +479,35 @@ mod tests {
     }
 
     #[test]
-    fn every_integration_test_is_listed_once() {
-        let mut all = integration_tests();
-        for name in [WAITING_TEST, "chain", "qemu", "wire"] {
-            assert!(all.iter().any(|test| test == name), "{name} of {all:?}");
+    fn every_fuzz_target_has_a_step() {
+        for name in fuzz_targets() {
+            let run = format!(" {name} target/fuzz/{name} ");
+            assert!(
+                all().iter().any(|step| step.command.contains(&run)),
+                "{name}"
+            );
         }
-        let count = all.len();
-        all.dedup();
-        assert_eq!(all.len(), count);
+        assert!(fuzz_targets().iter().any(|name| name == "mavlink"));
+    }
+
+    #[test]
+    fn every_integration_test_of_the_workspace_is_listed() {
+        let listed = integration_tests();
+        for name in [WAITING_TEST, "browser", "chain", "cli", "qemu", "wireshark"] {
+            assert!(
+                listed.iter().any(|test| test == name),
+                "{name} of {listed:?}"
+            );
+        }
+        let metadata = ["metadata", "--no-deps", "--format-version", "1"];
+        let output = Command::new(env!("CARGO")).args(metadata).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let after = text.split(r#"{"kind":["test"],"#).skip(1);
+        let mut known: Vec<&str> = after
+            .filter_map(|target| target.split(r#""name":""#).nth(1)?.split('"').next())
+            .collect();
+        known.sort_unstable();
+        known.dedup();
+        assert_eq!(listed, known);
     }
 }

@@ -24,12 +24,22 @@ const ASYNC_FEATURES: &[&str] = &["--no-default-features", "--features", "async"
 pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
     let (flash_with_log, ram_with_log) = sizes(&build(RELAY, &["--features", "defmt"])?)?;
     let mut rows = Vec::new();
-    for &(what, example, features, [flash, ram, stack]) in IMAGES {
-        rows.extend(of(what, example, features, flash, ram, stack)?);
+    for image in IMAGES {
+        rows.extend(of(&proven(image)?, image)?);
+    }
+    // The last image has the features of a usual build.
+    let usual = sizes(&build(RELAY, &[])?)?;
+    if let [.., flash, ram, _] = &rows[..]
+        && (flash.value, ram.value) != usual
+    {
+        return Err(format!(
+            "the image that cannot panic has other sizes than the flashed one, {usual:?}"
+        ));
     }
     let what = "flash of the relay image on asynchronous ports, Algorithm 1 alone";
-    let (flash, ram, stack) = (68 * 1024 + 256, 5_184, 4_608);
-    rows.extend(of(what, ASYNC, ASYNC_FEATURES, flash, ram, stack)?);
+    let costs = [68 * 1024 + 256, 5_184, 4_608];
+    let image = (what, ASYNC, ASYNC_FEATURES, costs);
+    rows.extend(of(&build(ASYNC, ASYNC_FEATURES)?, &image)?);
     rows.extend([
         row("its flash with defmt", "bytes", flash_with_log, None),
         row("its static RAM with defmt", "bytes", ram_with_log, None),
@@ -128,20 +138,15 @@ const IMAGES: &[Image] = &[
 ];
 
 fn of(
-    what: &'static str,
-    example: &str,
-    features: &[&str],
-    flash: u64,
-    ram: u64,
-    stack: u64,
+    elf: &Path,
+    &(what, example, features, [flash, ram, stack]): &Image,
 ) -> Result<[Row; 3], String> {
-    let image = build(example, features)?;
-    let (flash_taken, ram_taken) = sizes(&image)?;
+    let (flash_taken, ram_taken) = sizes(elf)?;
     let flies = features.is_empty()
         || features
             .iter()
             .any(|of| of.contains("flight") || of.contains("mavlink"));
-    let (thread, handler) = deepest_stack(&image, example != RADIO, flies)?;
+    let (thread, handler) = deepest_stack(elf, example != RADIO, flies)?;
     Ok([
         row(what, "bytes", flash_taken, Some(flash)),
         row("its static RAM", "bytes", ram_taken, Some(ram)),
@@ -178,13 +183,34 @@ fn cargo(command: &str, example: &str) -> Command {
     cargo
 }
 
+/// Returns the path of the disassembler.
+///
+/// # Errors
+/// The command to type, if the disassembler is missing.
+pub(crate) fn objdump() -> Result<PathBuf, String> {
+    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
+    llvm_tool("llvm-objdump").ok_or_else(|| missing.to_owned())
+}
+
 /// Builds a firmware example with the cargo options `more`; returns the path of its ELF file.
 pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
     run(cargo("build", example).args(more))?;
-    Ok(PathBuf::from("target")
-        .join(TARGET)
-        .join("firmware/examples")
-        .join(example))
+    Ok(elf(example))
+}
+
+fn elf(example: &str) -> PathBuf {
+    let folder = Path::new("target").join(TARGET);
+    folder.join("firmware/examples").join(example)
+}
+
+/// Links a firmware image with a panic handler that cannot be linked, which proves that no panic is reachable.
+///
+/// Without a reachable panic, the handler is not part of the image, so that the image is the flashed one to the byte.
+fn proven(&(what, example, features, _): &Image) -> Result<PathBuf, String> {
+    let mut link = cargo("rustc", example);
+    link.args(features).args(["--", "--cfg", "prove_no_panic"]);
+    run(&mut link).map_err(|error| format!("a panic is reachable, {what}: {error}"))?;
+    Ok(elf(example))
 }
 
 pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
@@ -211,9 +237,7 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 /// autopilot.
 pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
-    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
-    let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
-    let output = run(Command::new(objdump)
+    let output = run(Command::new(objdump()?)
         .args(["-d", "--no-show-raw-insn"])
         .arg(elf))?;
     let bytes = std::fs::read(elf).map_err(|error| error.to_string())?;
@@ -250,25 +274,12 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Proves that no relay image can panic.
-///
-/// Each image links with a panic handler that would make the link fail if it were used.
-///
-/// To test the proof, an image with a deliberate panic must fail to link.
-pub(crate) fn no_panic() -> Result<(), String> {
+/// Checks that a deliberate panic is found: an image with one must not link. [`proven`] links the images without one.
+pub(crate) fn a_panic_is_found() -> Result<(), String> {
     only_finished_futures_panic()?;
-    let link = |example: &str, features: &[&str], flags: &[&str]| {
-        run(cargo("rustc", example).args(features).arg("--").args(flags))
-    };
-    for (what, example, features, _) in IMAGES {
-        link(example, features, &["--cfg", "prove_no_panic"])
-            .map_err(|error| format!("a panic is reachable, {what}: {error}"))?;
-    }
-    match link(
-        RELAY,
-        &[],
-        &["--cfg", "prove_no_panic", "--cfg", "panic_on_purpose"],
-    ) {
+    let mut link = cargo("rustc", RELAY);
+    link.args(["--", "--cfg", "prove_no_panic", "--cfg", "panic_on_purpose"]);
+    match run(&mut link) {
         Ok(_) => Err("the deliberate panic was linked, so the check cannot detect panics".into()),
         Err(error) if error.contains("a_panic_is_reachable") => Ok(()),
         Err(error) => Err(format!(
@@ -284,9 +295,7 @@ pub(crate) fn no_panic() -> Result<(), String> {
 fn only_finished_futures_panic() -> Result<(), String> {
     const FINISHED: &str = "panic_const_async_fn_resumed";
     let image = build(ASYNC, ASYNC_FEATURES)?;
-    let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
-    let objdump = llvm_tool("llvm-objdump").ok_or(missing)?;
-    let output = run(Command::new(objdump)
+    let output = run(Command::new(objdump()?)
         .args(["-d", "-C", "--no-show-raw-insn"])
         .arg(&image))?;
     let text = String::from_utf8_lossy(&output.stdout);

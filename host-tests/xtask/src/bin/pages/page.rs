@@ -123,16 +123,7 @@ fn block(line: usize, heading: usize, info: &str) -> Result<Block, String> {
     })
 }
 
-/// Packages with programs that the pages use.
-const PACKAGES: [&str; 5] = [
-    "uav-relay-sim",
-    "uav-relay-tools",
-    "uav-relay-decode",
-    "uav-relay-linux",
-    "uav-relay-replay",
-];
-
-/// Time limit of one code block's commands, s. Blocks marked as slow have a longer limit.
+/// Time limit for the commands of one code block, s. Blocks marked as slow have a longer limit.
 const LIMIT_S: u32 = 60;
 const SLOW_S: u32 = 1_800;
 
@@ -155,12 +146,12 @@ pub(crate) struct Shell {
 impl Shell {
     pub(crate) fn build(root: &Path) -> Result<Self, String> {
         let failed = |what: &str, error: &dyn std::fmt::Display| format!("{what}: {error}");
-        let mut build = Command::new("cargo");
-        build.args(["build", "--quiet", "--locked", "--bins"]);
-        for package in PACKAGES {
-            build.args(["--package", package]);
-        }
-        let status = build.current_dir(root).status();
+        // With all targets, so that the features of the dependencies, and so the builds, are those of the tests.
+        let status = Command::new("cargo")
+            .args(["build", "--quiet", "--locked", "--workspace"])
+            .arg("--all-targets")
+            .current_dir(root)
+            .status();
         if !status.is_ok_and(|status| status.success()) {
             return Err("the programs do not build".to_owned());
         }

@@ -1,6 +1,8 @@
 //! Fuzz targets without a fuzzer: every input of the corpora, and thousands of random ones.
 //!
-//! `host-tests/fuzz` runs the same functions under libFuzzer. Random tests print their `SEED` (1 if unset).
+//! The targets in `host-tests/fuzz/harness` run the same functions under libFuzzer. Random tests print their `SEED` (1 if unset).
+#![cfg(test)]
+#![allow(clippy::float_cmp)]
 
 use std::fs;
 use std::path::PathBuf;
@@ -19,7 +21,7 @@ mod tools;
 static HEAP: Counting = Counting;
 
 fn folder(target: &str) -> PathBuf {
-    let fuzz = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/corpus");
+    let fuzz = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus");
     PathBuf::from(fuzz).join(target)
 }
 

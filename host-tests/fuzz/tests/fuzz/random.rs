@@ -3,7 +3,6 @@
 use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
 use uav_relay_fuzz::TARGETS;
-use uav_relay_oracle::random::seed;
 
 use super::corpus;
 
@@ -13,7 +12,9 @@ const INPUTS: usize = 1000;
 const LONGEST: usize = 300;
 
 fn rng() -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed(1))
+    let seed = std::env::var("SEED").map_or(1, |seed| seed.parse().unwrap());
+    println!("SEED={seed}");
+    ChaCha8Rng::seed_from_u64(seed)
 }
 
 /// Runs a fuzz target on inputs from `draw`. Panics with the first input on which it fails.

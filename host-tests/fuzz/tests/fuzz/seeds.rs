@@ -1,7 +1,7 @@
 //! Seeds of the corpora: golden frames, recorded flights, the example scenarios.
 //!
 //! ```sh
-//! cargo test --test fuzz -- --ignored write_the_seeds
+//! cargo test -p uav-relay-fuzz --test fuzz -- --ignored write_the_seeds
 //! cd host-tests
 //! cargo +nightly fuzz run relay                # and so on, for as long as you like; then
 //! cargo +nightly fuzz cmin relay -- -use_counters=0 -set_cover_merge=1
@@ -55,7 +55,7 @@ fn frame() -> Vec<Vec<u8>> {
 }
 
 fn scenario() -> Vec<Vec<u8>> {
-    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
+    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
     ["scenario", "multi_interferer", "field", "altitudes"]
         .iter()
         .map(|name| fs::read(format!("{examples}/{name}.toml")).unwrap())
