@@ -138,7 +138,7 @@ impl Node {
         self.duplicate.is_passive()
     }
 
-    /// Handles the operator's report that the duplicate of this relay's node number has been removed.
+    /// Handles the firmware's report that the duplicate of this relay's node number has been removed.
     pub(crate) fn clear_duplicate(&mut self, now: Instant) {
         if self.duplicate.clear(now, &self.member.settings) {
             self.become_active(now);

@@ -89,7 +89,7 @@ pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Replies are accepted to this number of latest heartbeat requests.
+/// Number of latest heartbeat requests to which replies are still accepted.
 const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]

@@ -457,7 +457,7 @@ impl LeaderTask {
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
-    /// true for a search at the configured altitudes, because the joint method found no altitudes.
+    /// true for a search at the configured altitudes, because no target is feasible at the joint method's altitudes.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,

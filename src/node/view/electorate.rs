@@ -247,7 +247,7 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
-    /// Test helper: disables the quorum rule, so that a test shows that the model check finds it.
+    /// Test helper: disables the quorum rule, a fault that the model check must find.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;
