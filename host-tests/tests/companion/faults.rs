@@ -555,8 +555,9 @@ fn subjects(text: &str) -> impl Iterator<Item = usize> {
     numbers.into_iter()
 }
 
-/// Returns true if an alarm begins with `start` and no digit follows. So an alarm about relay 10 is not taken for one about relay 1.
+/// Returns true if an alarm begins with `start`. If `start` ends with a relay's number, the alarm must be about the loss of this relay.
 fn is_of(alarm: &str, start: &str) -> bool {
+    let is_lost = |rest: &str| rest.starts_with(" lost") || rest.starts_with(": no report");
     let rest = alarm.strip_prefix(start);
-    rest.is_some_and(|rest| !rest.starts_with(|it: char| it.is_ascii_digit()))
+    rest.is_some_and(|rest| is_lost(rest) || !start.ends_with(|it: char| it.is_ascii_digit()))
 }
