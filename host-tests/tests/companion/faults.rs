@@ -373,11 +373,32 @@ impl Stage {
                 failures.push(format!("{group:?}: does not end: {it}"));
             }
         }
+        self.check_others(group, &new, failures);
+        for fault in group {
+            let of = |it: &&Value| {
+                is_of(
+                    &format!(
+                        "{} {}",
+                        it["urgency"].as_str().unwrap(),
+                        it["text"].as_str().unwrap()
+                    ),
+                    &text(fault),
+                )
+            };
+            let times = new.iter().filter(of).count();
+            if times != 1 {
+                failures.push(format!("{fault:?}: {times} alarms"));
+            }
+        }
+    }
+
+    /// Checks the alarms `new` of a group about relays without a fault: there are none, or they are true.
+    fn check_others(&mut self, group: &[Fault], new: &[Value], failures: &mut Vec<String>) {
         let hurt: Vec<usize> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
         // With both ends or most relays lost, the rest of the chain has no lease for a while, and may have no quorum.
         let is_torn =
             group.iter().filter(|it| it.0 == "kill").count() > 1 || group[0].0 == "no quorum";
-        for it in &new {
+        for it in new {
             let text = it["text"].as_str().unwrap();
             let by = text.strip_prefix(NO_QUORUM);
             let is_own = by.is_some() || text.contains(LEASE);
@@ -395,22 +416,6 @@ impl Stage {
             failures.push(format!(
                 "{group:?}: no lease for {most_s:.1} s, but no alarm"
             ));
-        }
-        for fault in group {
-            let of = |it: &&Value| {
-                is_of(
-                    &format!(
-                        "{} {}",
-                        it["urgency"].as_str().unwrap(),
-                        it["text"].as_str().unwrap()
-                    ),
-                    &text(fault),
-                )
-            };
-            let times = new.iter().filter(of).count();
-            if times != 1 {
-                failures.push(format!("{fault:?}: {times} alarms"));
-            }
         }
     }
 
