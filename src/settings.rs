@@ -152,7 +152,8 @@ pub struct Settings {
     /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
     /// Duration of the motion to a newly agreed position (feature `departures`). The setpoint moves to the new
-    /// position in 32 equal steps. With 0 it moves in one step.
+    /// position in 32 steps, at most 1.5 times as fast as on average. All relays of a chain begin together. With 0 it
+    /// moves in one step, at once.
     ///
     /// If all drones arrive together, no hop is worse on the way than before or after
     /// ([`docs::batteries`](crate::docs::batteries)). Choose the duration so that the drones fly the longest way, about

@@ -116,6 +116,21 @@ fn a_relay_at_a_wide_gap_is_refused() {
     assert_eq!(freed(&outcome, 3), None);
 }
 
+/// Checks that a relay between neighbours whose indices differ by more than four may leave once a spare between them has joined.
+#[test]
+fn a_spare_fills_a_wide_gap() {
+    for leaver in [3, 5] {
+        let mut setup = departing(8, &[(leaver, None)]);
+        setup.spares = vec![4];
+        let others = [2, 3, 5, 6].into_iter().filter(|relay| *relay != leaver);
+        setup.kills = others.map(|relay| (relay, seconds(5))).collect();
+        let outcome = run(setup.clone()).unwrap();
+        println!("relay {leaver} free after {:?} s", freed(&outcome, leaver));
+        judge(&setup, &outcome, &[1, 4, 7, 8]).unwrap();
+        assert!(freed(&outcome, leaver).is_some(), "{leaver}");
+    }
+}
+
 /// Checks that a relay without a motion guard may leave the chain only if `leave_without_guard` is set.
 #[test]
 fn without_a_guard_a_relay_is_refused() {
@@ -307,6 +322,8 @@ fn a_spare_joins_before_a_relay_leaves() {
         (2, 9),
         (8, 9),
         (5, 4),
+        (1, 3),
+        (1, 2),
     ] {
         let mut setup = departing(9, &[(leaver, None)]);
         setup.spares = vec![spare];
