@@ -1,7 +1,7 @@
 //! Guards beside a relay that leaves the chain, and of a relay that joins from a hover. Messages are passed by hand.
 
 use uav_relay::guard::config::{Geofence, GuardConfig};
-use uav_relay::guard::{Guard, HoldReason};
+use uav_relay::guard::{Fence, Guard, HoldReason};
 use uav_relay::{Duration, Instant, Placement, Side};
 
 /// Separation of the relays, m.
@@ -160,7 +160,7 @@ fn joining(reports: &[(u64, f32)], lost: bool) -> (Guard, Instant) {
 /// Returns true if the guard offers its neighbour an association: only then the two can move.
 fn offers(guard: &mut Guard) -> bool {
     let sent = guard.poll().expect("it sends its position");
-    sent.2.flags & uav_relay::guard::Fence::UNPLACED == 0
+    sent.2.flags & Fence::UNPLACED == 0
 }
 
 const HOVER: [(u64, f32); 4] = [
@@ -215,6 +215,26 @@ fn a_relay_that_joins_keeps_clear_of_a_lost_one() {
     assert_eq!(guard.hold_reason(Side::Downstream), Some(HoldReason::Lost));
     guard.forget(Side::Downstream, false);
     assert_eq!(guard.steer(now), Some(at(400.0)));
+}
+
+/// Checks that a neighbour that has not sent a position yet does not make the relay open the chain.
+#[test]
+fn a_neighbour_without_a_position_is_not_too_close() {
+    let (mut guard, now) = joining(&HOVER, false);
+    let (_, _, sent) = guard.poll().expect("it sends its position");
+    let reply = Fence {
+        association: 5,
+        echo: sent.association,
+        number: 0,
+        flags: Fence::UNPLACED,
+        x_m: 300.0,
+        target_m: 300.0,
+        ..sent
+    };
+    guard.handle_fence(Side::Downstream, 2, &reply);
+    guard.steer(now);
+    let (_, _, next) = guard.poll().expect("it replies");
+    assert_eq!(next.flags & Fence::REQUESTS_OPENING, 0);
 }
 
 /// Checks that a hover in the pilot's hands does not count.
