@@ -519,14 +519,14 @@ fn at_least(all: &[Replaced], least: f64) -> usize {
     good.count()
 }
 
-/// Checks that each relay may leave, and that the SIR is at least 0.9 of the optimum of eight relays. In 45 of 50 scenes the SIR must be at
+/// Checks that each relay may leave, and that the SIR is at least 0.98 of the optimum of eight relays. In 47 of 50 scenes the SIR must be at
 /// least 0.99 of the optimum.
 #[test]
 fn a_replacement_beside_the_line_leaves_almost_no_gap() {
     let all = replaced_in("beside the line", scene);
     assert!(all.iter().all(|one| one.free.is_some()));
-    assert_eq!(at_least(&all, 0.9), 50);
-    assert!(at_least(&all, 0.99) >= 45);
+    assert_eq!(at_least(&all, 0.98), 50);
+    assert!(at_least(&all, 0.99) >= 47);
 }
 
 /// Checks that each relay may leave wherever the interferer is.
