@@ -533,10 +533,11 @@ impl Guard {
         !self.flown || self.own.setpoint.is_some() || self.own.hovers(now)
     }
 
-    /// Returns true if the relay hovers at its setpoint, which a report has shown, or has no setpoint. The setpoint can be
-    /// short of the agreed position.
+    /// Returns true if the relay hovers at its setpoint, which a report has shown. The setpoint can be short of the agreed
+    /// position. Also true in manual control, and without any report.
     pub fn is_still(&self) -> bool {
-        !self.flown || self.own.reachable.has_arrived() && self.own.arrived
+        let hovers = self.own.reachable.has_arrived() && self.own.arrived;
+        hovers || !self.flown || self.own.reported.is_none()
     }
 
     /// Returns the reason on the given side that keeps this relay from its agreed position. `None` without such a
