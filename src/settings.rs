@@ -151,8 +151,9 @@ pub struct Settings {
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With a guard the
     /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// Duration of the move to a new position on which the chain has agreed (feature `departures`). The setpoint moves
-    /// in 32 equal steps; with 0 it moves in one step.
+    /// Duration of the motion to a newly agreed position (feature `departures`). The setpoint moves to the new
+    /// position in 32 steps, at most 1.5 times as fast as on average. All relays of a chain begin together. With 0 it
+    /// moves in one step, at once.
     ///
     /// If all drones arrive together, no hop is worse on the way than before or after
     /// ([`docs::batteries`](crate::docs::batteries)). The longest way is about a spacing of the chain. Choose the

@@ -31,13 +31,13 @@
 //! | 2 | The follower reports the number of the newest fence received, and the low end of its interval. If the x that it relies on downstream (rule 3) is lower, it reports this x, because errors of the reports of relays in order may add up. | a relay is known to be beyond all relays upstream |
 //! | 3 | The owner relies on the lowest of that low end, if reported together with the newest fence, and every fence announced since. | no message in transit lets the follower come nearer than the owner relies on |
 //! | 4 | The owner never raises its setpoint to less than the step before the x it relies on. | the two intervals are the step apart |
-//! | 5 | The owner announces no fence nearer than the step beyond the high end of its interval. | a fence that is lowered has already been cleared |
-//! | 6 | As far as rule 5 allows, the fence is halfway between the two agreed positions plus half the step. | both can reach their positions |
-//! | 7 | The first fence is the separation beyond the owner's interval. Other fences, and changes of cross-section, start when the follower has cleared it. Until a relay has cleared the first fence upstream, it keeps room for the owner of that fence: each fence that it sends downstream is at least the separation beyond the highest x that the owner may still take. | a start that is too close is opened first, and no relay descends onto another |
-//! | 8 | The first setpoint is the last reported position, with its cross-section, even outside of the geofence. It remains until both neighbours are known to be in order: the follower has reported that it is beyond the owner, the owner has announced a fence. A relay sends a position that counts to one neighbour only while it is in order with the other one. | nothing is granted before the order is known, after a start, a reboot or a new link |
-//! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If the neighbour was never received, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
-//! | 10 | With a fence the owner sends the step that it requests. After a step below the separation neither changes its cross-section until the next step that equals the separation: the owner from its request on, the follower from its reception on. | the follower's reported cross-section remains valid |
-//! | 11 | The step is the separation. It becomes smaller when the follower has reported, together with the newest fence, its cross-section, that it has arrived there, and that it agrees. Then it is the largest of the requested step, of the distance along x that the two cross-sections still require, and of the step by rule 12. The owner announces a larger one only once it is that far before the x it relies on. | the two are the separation apart in space |
+//! | 5 | The owner announces no fence nearer than the step beyond the high end of its own interval. | a fence that is lowered has already been cleared |
+//! | 6 | As far as rule 5 allows, the fence is halfway between the two agreed positions plus half the step. Beside a relay with the order to leave, which holds its position, it is next to that relay. | both can reach their positions, and the neighbours close up to one that leaves |
+//! | 7 | The first fence is the separation beyond the owner's own interval. Other fences, and moves across the line, start when the follower has cleared it. Until a relay has cleared the first fence upstream, it keeps room for the owner of that fence: each fence that it sends downstream is at least the separation beyond the highest x that the owner may still take. | a start that is too close is opened first, and no relay descends onto another |
+//! | 8 | The first setpoint is the last reported position, with side and altitude, even outside of the geofence. Its x counts once a report shows the effect of the setpoint, or at once if the drone hovered there for the lag before. The setpoint remains until both neighbours are known to be in order: the follower has reported that it is beyond the owner, the owner has announced a fence. A relay sends a position that counts to one neighbour only while it is in order with the other one. | nothing is granted before the order is known, after a start, a reboot or a new link |
+//! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If it was never heard, this relay goes no farther toward it. | no relay flies into a silent one that still hovers |
+//! | 10 | With a fence the owner sends the step that it requests. From a step below the separation until the next one that equals it, neither moves across the line: the owner from its request on, the follower from its reception on. | the follower's reported position across the line remains valid |
+//! | 11 | The step is the separation. It becomes smaller when the follower has reported, together with the newest fence, that and where it has arrived across the line, and that it agrees. Then it is the largest of the requested step, of the distance along x that the two positions across the line still require, and of the step by rule 12. The owner announces a larger one only once it is that far before the x it relies on. | the two are the separation apart in space |
 //! | 12 | The steps upstream and downstream of a relay add up to at least the separation: it agrees to a smaller step upstream, and takes one downstream, only as far as the sum allows. | relays that are not neighbours are the separation apart along x |
 //! | 13 | A relay requests an *open* chain on both sides if it has to change its cross-section and may not by rule 10, or if it started too close to a neighbour whose agreed position is close. Every relay forwards the request. Then all fly to positions in the same order that are the separation apart along x, and steps are the separation. | there is room to change the cross-section |
 //! | 14 | From a neighbour that became silent within the separation along x this relay moves away to the separation. Before, it does not change its cross-section, and later it does not come back nearer. The same applies if it never received the neighbour, or had not cleared the first fence. If the neighbour was out of order with it, it holds its position. | the position of the silent relay still counts |
@@ -196,6 +196,7 @@ impl Guard {
             own.report(at, place);
         } else if self.flown && at >= self.started_at && own.config.may_begin_at(place) {
             self.initial_place = Some(place);
+            own.report_hover(at, place);
         }
     }
 
@@ -211,8 +212,9 @@ impl Guard {
         self.flown = flown;
         (self.disorder, self.unordered) = (false, 0);
         (self.started_at, self.initial_place) = (now, None);
-        if self.own.setpoint.is_some() {
-            self.own.release(now);
+        let begun = self.own.setpoint.is_some();
+        self.own.release(now);
+        if begun {
             self.follower.leave(&mut self.jitter);
             self.owner.leave(&mut self.jitter);
         }
@@ -242,7 +244,13 @@ impl Guard {
         self.own.config.geofence = fence;
     }
 
-    /// Handles a fence message (limit of x) from node `from`, a neighbour at `side`.
+    /// Records that relay `node` has the order to leave the chain, 0 for none. The fences beside it then leave it no
+    /// more room than its own position needs.
+    pub const fn set_leaver(&mut self, node: u16) {
+        self.own.leaver = node;
+    }
+
+    /// Handles a message about a fence (limit of x) from node `from`, a neighbour at `side`.
     ///
     /// A message out of range is counted and ignored. A message of an earlier association (session) or of another node
     /// is ignored.
@@ -309,7 +317,9 @@ impl Guard {
         let target = self.own.target?;
         let Some(before) = self.own.setpoint else {
             let found = self.initial_place?;
+            let hovers = self.own.hovers(now);
             self.own.reachable = ReachableInterval::at(found.x_m, now);
+            self.own.reachable.known = hovers;
             let (x_m, apart) = (found.x_m, self.own.config.separation_m);
             self.follower.keep_out.begin(x_m, x_m + apart);
             self.owner.keep_out.begin(x_m, x_m - apart);
@@ -520,7 +530,26 @@ impl Guard {
         }
     }
 
-    /// Returns the reason on `side` that keeps this relay from its agreed position.
+    /// Returns true if the neighbour downstream has answered the newest fence (limit of x), or cannot.
+    pub fn is_answered(&self) -> bool {
+        self.owner.is_answered()
+    }
+
+    /// Returns true if the drone's position at the first setpoint will be known at once: it hovers. Also true in manual
+    /// control, in which it cannot begin.
+    pub fn may_begin(&self, now: Instant) -> bool {
+        !self.flown || self.own.setpoint.is_some() || self.own.hovers(now)
+    }
+
+    /// Returns true if the relay hovers at its setpoint, which a report has shown. The setpoint can be short of the agreed
+    /// position. Also true in manual control, and without any report.
+    pub fn is_still(&self) -> bool {
+        let hovers = self.own.reachable.has_arrived() && self.own.arrived;
+        hovers || !self.flown || self.own.reported.is_none()
+    }
+
+    /// Returns the reason on the given side that keeps this relay from its agreed position. `None` without such a
+    /// reason, or without an agreed position.
     ///
     /// `None` without such a reason, or without an agreed position. Shortly after a new agreement the reason may still
     /// refer to the previous positions. While the drone does not fly to setpoints, only [`HoldReason::Order`] is

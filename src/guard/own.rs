@@ -7,7 +7,7 @@
 use super::config::GuardConfig;
 use crate::place::{CrossSection, Placement};
 use crate::side::Side;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Span {
@@ -47,8 +47,9 @@ pub(super) struct ReachableInterval {
     /// position report.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report is late enough to show the effect of the first setpoint.
-    known: bool,
+    /// True once a position report was measured late enough to show the effect of the first setpoint. Also true if the
+    /// drone hovered before it.
+    pub(super) known: bool,
 }
 
 impl ReachableInterval {
@@ -127,14 +128,19 @@ impl ReachableInterval {
     }
 }
 
-/// Number of reminders (seconds) after which a setpoint that has not moved counts as held up.
+/// Time between two reports of a drone's position from which it does not count as hovering between them.
+const HOVER_REPORTS: Duration = Duration::from_millis(2_500);
+
+/// Number of seconds after which a setpoint that has not moved counts as held up.
 const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
     pub(super) config: GuardConfig,
-    node: u16,
-    /// Position that the chain has agreed on, limited to the geofence; `None` before the first agreement.
+    pub(super) node: u16,
+    /// Relay with the order to leave, which holds its position; 0 for none.
+    pub(super) leaver: u16,
+    /// Agreed position, inside the geofence; `None` before the first agreement.
     pub(super) target: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
@@ -152,8 +158,9 @@ pub(super) struct Own {
     pub(super) sent_place: Placement,
     /// Number of reminders (seconds) since the last change of the setpoint.
     reminders: u8,
-    /// Last setpoint at which this relay arrived, or its first setpoint. If the relay then halts on its way, it stops
-    /// no farther outside the geofence than here.
+    /// Last setpoint at which this relay arrived, or its first setpoint. If the relay halts on its way from this
+    /// setpoint, it stops no farther outside the geofence than this setpoint. Before the first setpoint: the position
+    /// at which the drone hovers.
     last_arrival: Placement,
 }
 
@@ -162,6 +169,7 @@ impl Own {
         Self {
             config,
             node,
+            leaver: 0,
             target: None,
             setpoint: None,
             reachable: ReachableInterval::unknown(now),
@@ -225,11 +233,8 @@ impl Own {
 
     /// Returns true if the relay has moved away from `sent_place`, the position in its last message.
     pub(super) fn has_moved(&self) -> bool {
-        self.reported.is_some_and(|place| {
-            !self.is_near(place.cross_section(), self.sent_place.cross_section())
-                || (place.x_m - self.sent_place.x_m).abs()
-                    > self.config.hover_m + self.config.rounding()
-        })
+        self.reported
+            .is_some_and(|place| !self.is_at(place, self.sent_place))
     }
 
     /// Clears the setpoint and the known x. Called when the drone no longer flies to setpoints, or the line from Tx to
@@ -267,14 +272,42 @@ impl Own {
         self.set_setpoint(place, now);
     }
 
-    /// Handles a position report, measured at time `at`. If `at` is long enough after the last change of lateral offset
-    /// and altitude, the relay has arrived there.
+    /// Handles a position report before the first setpoint, measured at time `at`: the drone hovers while its reports
+    /// agree.
+    pub(super) fn report_hover(&mut self, at: Instant, place: Placement) {
+        let stays = self.is_at(place, self.last_arrival);
+        if !(stays && at < self.reachable.reported_at + HOVER_REPORTS) {
+            self.last_arrival = place;
+            self.reachable.changed_at = at;
+        }
+        self.reachable.reported_at = at;
+    }
+
+    /// Returns true if the drone has hovered for the [`lag`](GuardConfig::lag) when its first setpoint is due.
+    pub(super) fn hovers(&self, now: Instant) -> bool {
+        let ReachableInterval {
+            reported_at,
+            changed_at,
+            ..
+        } = self.reachable;
+        reported_at >= changed_at + self.config.lag && now < reported_at + HOVER_REPORTS
+    }
+
+    /// Handles a position report, measured at time `at`. The relay has arrived at its lateral offset and altitude if
+    /// `at` is long enough after their last change.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.arrived |= at >= self.cross_section_changed_at + self.config.lag
             && self.is_near(place.cross_section(), self.cross_section());
         if let Some(setpoint) = self.setpoint.filter(|_| self.arrived) {
             self.last_arrival = setpoint;
         }
+    }
+
+    /// Returns true if two positions agree, within a hovering relay's position error.
+    fn is_at(&self, is: Placement, to_be: Placement) -> bool {
+        let most = self.config.hover_m + self.config.rounding();
+        self.is_near(is.cross_section(), to_be.cross_section())
+            && (is.x_m - to_be.x_m).abs() <= most
     }
 
     /// Returns true if two lateral offsets and altitudes agree, within a hovering relay's position error.

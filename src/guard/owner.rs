@@ -286,12 +286,20 @@ impl FenceOwner {
 
     /// Returns true if the agreed x of this relay and of its downstream neighbour are too close.
     pub(super) fn is_close(&self, own: &Own) -> bool {
-        self.has_reply() && own.is_close(self.target_m - own.target_m())
+        // Before its first position the neighbour's agreed x is unknown.
+        let place = self.neighbour_place();
+        place.is_some_and(|place| own.is_close(place.x_m - own.target_m()))
     }
 
     /// Returns true if the downstream neighbour is known to be beyond the newest fence.
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
+    }
+
+    /// Returns true if the downstream neighbour has answered the newest fence (limit of x), or cannot.
+    pub(super) fn is_answered(&self) -> bool {
+        let cannot = !self.has_reply() || self.association.has_no_flown_neighbour();
+        cannot || self.is_acknowledged && !self.association.due
     }
 
     /// Returns the smallest permitted distance along x between this relay and its downstream neighbour, m.
@@ -338,7 +346,14 @@ impl FenceOwner {
             return Some((nearest, step_m, true));
         }
         let other_m = own.goal_of(self.association.node, self.target_m);
-        let goal = 0.5 * (own.goal_m() + other_m + best);
+        // A relay with the order to leave holds its position: its neighbours get all the room up to it.
+        let goal = if own.leaver == own.node {
+            own.goal_m() + best
+        } else if own.leaver == self.association.node {
+            other_m
+        } else {
+            0.5 * (own.goal_m() + other_m + best)
+        };
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 

@@ -109,6 +109,8 @@ struct Departures {
     leaver: (u16, Instant),
     /// Time of the agreement on positions in this view, as seen by the leader.
     settled_at: Instant,
+    /// Time at which the first renewal of this view turned at the last relay; `None` until it has completed here.
+    turned_at: Option<Instant>,
 }
 
 const fn from_tenths(tenths: u16) -> Duration {
@@ -137,6 +139,7 @@ impl Lease {
                 complement: 0,
                 leaver: (0, now),
                 settled_at: now,
+                turned_at: None,
             }; DEPARTURES as usize],
         }
     }
@@ -192,9 +195,11 @@ impl Lease {
         } else {
             requests.spare
         };
-        if requests.leaver != 0 && spare != 0 && relays <= known.complement && !late {
+        let joins = requests.leaver != 0 && spare != 0 && relays <= known.complement && !late;
+        let settled = in_place && self.orders.in_place;
+        if joins && (settled || self.orders.joiner != 0) {
             orders.joiner = spare;
-        } else if in_place && self.orders.in_place || late {
+        } else if !joins && (settled || late) {
             orders.leaver = requests.leaver;
         }
         orders
@@ -276,6 +281,17 @@ impl Lease {
         self.circulation.withdraw();
         self.orders = Orders::NONE;
         self.requests = None;
+        if let Some(departures) = self.departures.first_mut() {
+            departures.turned_at = None;
+        }
+    }
+
+    /// Returns the time at which the first renewal of this view turned at the last relay; `None` until it is known.
+    ///
+    /// Each relay takes it as the middle between its forwarding of the renewal and its reception of the reply, so that
+    /// all relays know about the same time, without a common clock.
+    pub(crate) fn turned_at(&self) -> Option<Instant> {
+        self.departures.first()?.turned_at
     }
 
     /// Records that all members have accepted this relay's view. Leases of earlier views end before the positions of
@@ -390,6 +406,10 @@ impl Lease {
                 Some(received.map_or(own, |received| received.merge(own)))
             }
         };
+        if let Some(departures) = self.departures.first_mut() {
+            let half = Duration::from_micros(context.now.since(forwarded_at).as_micros() / 2);
+            departures.turned_at.get_or_insert(forwarded_at + half);
+        }
         self.vouched_until = self
             .vouched_until
             .max(context.now + from_tenths(current.span));

@@ -49,7 +49,7 @@ const UNCONFIRMED: Duration = Duration::from_millis(3000);
 /// reports.
 const MOST_DOUBLINGS: u8 = 3;
 
-/// Number in place of a count of unconfirmed Watches: the relay four numbers away sends its reports to the station itself.
+/// Value of `Watched::unconfirmed` while the relay four numbers away reports to the station itself.
 const DIRECT: u8 = MOST_DOUBLINGS + 1;
 
 /// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
@@ -157,8 +157,9 @@ struct Watched {
     /// distances from this relay.
     hand_on: u8,
     hand_on_at: Instant,
-    /// Time of the last report of the relay that is four numbers farther from the station, or of its last frame to the
-    /// station. `unconfirmed` is `DIRECT` after the latter, else it counts the Watches sent to that relay since then.
+    /// Time of the last report of the relay four numbers farther, or of its last frame to the station.
+    ///
+    /// `unconfirmed` is `DIRECT` after such a frame, else it counts the Watches sent to that relay since then.
     confirmed: Instant,
     unconfirmed: u8,
     /// Node to which a handshake must be sent that requests a reply; `None` if there is none.

@@ -30,18 +30,21 @@ pub(crate) struct Steering {
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
-/// Motion to a new agreed position: start position, start time, duration, and time of the next step.
+/// Motion to a new agreed position: start time, duration, time of the next step, and number of steps made.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
-    from: Placement,
     since: Instant,
     span: Duration,
     at: Instant,
+    steps: u8,
+    /// True while the common begin is not known yet.
+    waits: bool,
 }
 
-/// Stepwise motion of the setpoint to a new agreed position.
-///
-/// The motion takes the same time at all relays of a chain, so that they arrive together.
+/// Longest wait for the common begin of a motion.
+const WAIT: Duration = Duration::from_millis(15_000);
+
+/// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that they arrive together.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     /// Agreed position at the last call of `advance`. `wanted`, the position to fly to now, approaches it in steps.
@@ -59,63 +62,72 @@ impl Way {
     };
 
     /// Returns the position to fly to at `now`; `None` without an agreed position. If `agreed` has changed, the
-    /// position to fly to approaches it in 32 steps within the time `span`.
+    /// position to fly to moves there in 32 steps within the time `span`.
+    ///
+    /// The motion begins at `begin`, the same time at all relays of the view, or after [`WAIT`] if it is not known before.
     fn advance(
         &mut self,
         now: Instant,
         agreed: Option<Placement>,
         span: Duration,
+        begin: Option<Instant>,
     ) -> Option<Placement> {
+        if let (Some(motion), Some(begin)) = (&mut self.motion, begin)
+            && core::mem::take(&mut motion.waits)
+            && now < motion.since
+        {
+            (motion.since, motion.at) = (begin, begin);
+        }
         self.step(now);
         if agreed == self.agreed {
             return self.wanted;
         }
         self.agreed = agreed;
-        // If a new motion begins during a motion, it ends when the old one would have ended. So frequent agreements do
-        // not delay the end.
-        let left = self.motion.map(|it| (it.since + it.span).since(now));
-        let span = left.map_or(span, |left| left.min(span));
-        self.motion = self
-            .wanted
-            .filter(|_| agreed.is_some() && span > Duration::from_micros(0))
-            .map(|from| Motion {
-                from,
-                since: now,
+        if span == Duration::from_micros(0) || agreed.is_none() || self.wanted.is_none() {
+            (self.motion, self.wanted) = (None, agreed);
+        } else if self.motion.is_none() {
+            let since = if begin.is_some() { now } else { now + WAIT };
+            self.motion = Some(Motion {
+                since,
                 span,
-                at: now,
+                at: since,
+                steps: 0,
+                waits: begin.is_none(),
             });
-        if self.motion.is_none() {
-            self.wanted = agreed;
         }
+        // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
         self.step(now);
         self.wanted
     }
 
     /// Makes all steps of the current motion that are due at `now`.
     fn step(&mut self, now: Instant) {
-        let (Some(motion), Some(to)) = (&mut self.motion, self.agreed) else {
+        let (Some(motion), Some(from), Some(to)) = (&mut self.motion, self.wanted, self.agreed)
+        else {
             return;
         };
-        let Motion {
-            from,
-            since,
-            span,
-            at,
-        } = motion;
-        let steps =
-            (u32::from(tenths(now.since(*since))) << STEPS) / u32::from(tenths(*span).max(1));
-        let Some(part) = u8::try_from(steps)
+        if now < motion.at {
+            return;
+        }
+        let spent = u32::from(tenths(now.since(motion.since))) << STEPS;
+        let steps = spent / u32::from(tenths(motion.span).max(1));
+        let Some(steps) = u8::try_from(steps)
             .ok()
             .filter(|steps| *steps >> STEPS == 0)
         else {
-            self.motion = None;
-            self.wanted = Some(to);
+            (self.motion, self.wanted) = (None, Some(to));
             return;
         };
-        if *at <= now {
-            *at = now + Duration::from_micros((span.as_micros() >> STEPS).max(1));
-        }
-        let part = f32::from(part) / 32.0;
+        let each = Duration::from_micros((motion.span.as_micros() >> STEPS).max(1));
+        let next = motion.since + each.times(u32::from(steps) + 1);
+        motion.at = if next > now { next } else { now + each };
+        // Slow at both ends, where a relay that is late costs most.
+        let done = |steps: u8| {
+            let part = f32::from(steps) / 32.0;
+            part * part * (3.0 - 2.0 * part)
+        };
+        let before = done(core::mem::replace(&mut motion.steps, steps));
+        let part = (done(steps) - before) / (1.0 - before);
         let between = |from: f32, to: f32| from + (to - from) * part;
         self.wanted = Some(Placement {
             x_m: between(from.x_m, to.x_m),
@@ -148,20 +160,26 @@ impl Steering {
         self.guard = config.map(|config| Guard::new(config, neighbours, seed, now));
     }
 
+    /// Returns the guard; `None` without one.
+    pub(crate) fn known_guard(&self) -> Option<&Guard> {
+        self.guard.as_ref().filter(|_| GUARD)
+    }
+
     fn guard(&mut self) -> Option<&mut Guard> {
         self.guard.as_mut().filter(|_| GUARD)
     }
 
-    /// Moves the setpoint toward the agreed position as far as the guard permits at `now`. Returns true if the setpoint
-    /// has changed. A motion to a new position takes `span`.
+    /// Moves the setpoint toward the position `agreed` as far as the guard allows at `now`. Returns true if the
+    /// setpoint has changed. A motion to a new position takes `span`, and begins at `begin`.
     pub(crate) fn steer(
         &mut self,
         now: Instant,
         agreed: Option<Placement>,
         span: Duration,
+        begin: Option<Instant>,
     ) -> bool {
         let agreed = match self.way.first_mut() {
-            Some(way) => way.advance(now, agreed, span),
+            Some(way) => way.advance(now, agreed, span, begin),
             None => agreed,
         };
         if let Some(agreed) = agreed
@@ -207,7 +225,15 @@ impl Steering {
         }
     }
 
-    /// Handles a fence message of the neighbour `from` at `side`.
+    /// Records the relay that has the order to leave, 0 for none.
+    pub(crate) fn set_leaver(&mut self, node: u16) {
+        if let Some(guard) = self.guard().filter(|_| DEPARTURES) {
+            guard.set_leaver(node);
+        }
+    }
+
+    /// Handles a fence message of the neighbour `from` at `side`. A fence is the plane across x that keeps two
+    /// neighbours apart.
     pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) {
         if let Some(guard) = self.guard() {
             guard.handle_fence(side, from, fence);
@@ -268,12 +294,12 @@ impl Steering {
     }
 
     pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
-        self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
+        self.known_guard()?.hold_reason(side)
     }
 
     /// Returns the neighbour's agreed position at `side`. `None` while this position is unknown, and without a guard.
     pub(crate) fn neighbour_place(&self, side: Side) -> Option<Placement> {
-        self.guard.as_ref().filter(|_| GUARD)?.neighbour_place(side)
+        self.known_guard()?.neighbour_place(side)
     }
 
     /// Returns the next fence message, with its side and destination node; `None` if none is pending.
@@ -299,19 +325,51 @@ mod tests {
         Instant::ZERO + Duration::from_millis(ms)
     }
 
-    /// Checks that a motion ends on time even if new agreements arrive during it.
+    /// Checks that relays that learn their positions at different times begin together, once they know when.
+    #[test]
+    fn relays_begin_at_the_same_time() {
+        let span = Duration::from_millis(20_000);
+        let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
+        let mut all = [Steering::NONE; 2].map(|mut steering| {
+            steering.steer(at_ms(0), place(0.0), span, None);
+            steering
+        });
+        let [one, other] = &mut all;
+        one.steer(at_ms(1_000), place(100.0), span, None);
+        other.steer(at_ms(2_300), place(100.0), span, None);
+        for ms in (2_500..30_000).step_by(500) {
+            // The second one learns the beginning after it.
+            let begin = |known_at: u64| (ms >= known_at).then_some(at_ms(3_000));
+            one.steer(at_ms(ms), place(100.0), span, begin(2_500));
+            other.steer(at_ms(ms), place(100.0), span, begin(4_500));
+            let [x_m, other_m] = [&one, &other].map(|it| it.setpoint(place(100.0)).unwrap().x_m);
+            assert!(ms > 3_000 || x_m == 0.0, "{ms}: {x_m}");
+            let apart_m = (x_m - other_m).abs();
+            assert!(ms < 4_500 || apart_m < 0.1, "{ms}: {x_m} and {other_m}");
+            assert!((ms >= 23_000) == (x_m == 100.0), "{ms}: {x_m}");
+        }
+        // Without a beginning, after the longest wait.
+        one.steer(at_ms(30_000), place(0.0), span, None);
+        one.steer(at_ms(44_900), place(0.0), span, None);
+        assert_eq!(one.setpoint(place(0.0)), place(100.0));
+        one.steer(at_ms(55_000), place(0.0), span, None);
+        let half_m = one.setpoint(place(0.0)).unwrap().x_m;
+        assert!((half_m - 50.0).abs() < 0.1, "{half_m}");
+    }
+
+    /// Checks that the motion ends in time even if new agreements arrive before its end.
     #[test]
     fn frequent_agreements_do_not_put_off_the_arrival() {
         let span = Duration::from_millis(20_000);
         let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
         let mut steering = Steering::NONE;
-        steering.steer(at_ms(0), place(0.0), span);
+        steering.steer(at_ms(0), place(0.0), span, None);
         let mut reached_m = 0.0;
         let mut agreed = None;
         for step in 0..20 {
             // A new agreed position every second, each a little farther away.
             agreed = place(100.0 + step as f32 / 10.0);
-            steering.steer(at_ms(1_000 * step), agreed, span);
+            steering.steer(at_ms(1_000 * step), agreed, span, Some(at_ms(0)));
             let x_m = steering.setpoint(agreed).unwrap().x_m;
             assert!(
                 x_m >= reached_m && x_m <= reached_m + 10.0,
@@ -319,7 +377,7 @@ mod tests {
             );
             reached_m = x_m;
         }
-        steering.steer(at_ms(20_000), agreed, span);
+        steering.steer(at_ms(20_000), agreed, span, Some(at_ms(0)));
         assert!(!steering.is_moving() && steering.setpoint(agreed) == agreed);
     }
 }

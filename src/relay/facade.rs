@@ -779,9 +779,9 @@ impl Relay {
 
     /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
     ///
-    /// Call it right after the start: it has no effect once the relay has taken part in an agreement or a view change.
-    /// The first leader cannot be a spare, nor can a relay with two wires. No guard knows where a waiting spare is. So
-    /// its distance from all positions of the chain must be at least the separation. Takes constant time.
+    /// Call it right after the start and [`resume_view`](Self::resume_view): it has no effect once the relay has taken
+    /// part in a pass or a view change. A relay with two wires cannot be a spare. No guard knows the place of a waiting spare: it
+    /// has to wait at least the separation away from all positions of the chain. Takes constant time.
     pub fn wait_as_spare(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.wait_as_spare(now);

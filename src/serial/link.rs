@@ -279,8 +279,8 @@ pub struct SerialStats {
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each attempt is repeated.
     pub pin: u32,
-    /// Number of frames dropped because the transmit queue was full: the port accepts no bytes. The relay sends important
-    /// frames again.
+    /// Number of frames dropped because the transmit queue was full: the port accepts no bytes. The relay sends
+    /// important frames again.
     pub dropped: u32,
     /// Number of frames for a port that this driver does not have. The relay's [`Wiring`](crate::Wiring) then does not
     /// match the driver.

@@ -135,8 +135,13 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
         return "overheard";
     }
     let sender = frame.sender();
-    // On a shared channel the four nearest nodes of either side are possible senders.
-    let far = if port == Port::Shared { 4 } else { 1 };
+    // On a shared channel the four nearest nodes of either side are possible senders, and ground stations up to eight numbers away.
+    let is_station = sender == 0 || sender == relays + 1;
+    let far = match port {
+        Port::Shared if is_station => 8,
+        Port::Shared => 4,
+        _ => 1,
+    };
     // The ground stations are beyond the ends.
     let there = sender <= relays + 1 && sender.abs_diff(to) <= far;
     let before = port != Port::Downstream && there && sender < to;

@@ -34,7 +34,7 @@ const MOST: Duration = Duration::from_secs(90);
 /// Time without a lease after which the page shows an alarm, s.
 const EXPIRED_S: f64 = 5.0;
 
-/// Longest time between a relay's own state and the report of it, and between two queries of that state, s.
+/// Longest time between a relay's state and its report, and between two queries of that state, s.
 const NEAR_S: f64 = 2.0;
 
 /// Longest wait for a snapshot of the page between two queries of relays' states.
@@ -153,14 +153,14 @@ fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
 /// State of a relay by its own status and log, since the begin of the present group of faults.
 #[derive(Clone, Debug, Default)]
 struct Own {
-    /// Times of the queries of its status, s, each with true if the relay had an agreed position but no lease.
+    /// Time of each query of its status, s, with true if the relay had a setpoint but no lease.
     leaseless: Vec<(f64, bool)>,
     /// True if the relay has logged that it has no quorum.
     lacks_quorum: bool,
 }
 
 impl Own {
-    /// Returns true if the relay had no lease for most of the time before an alarm, which is based on its report of the time `at_s`.
+    /// Returns true if the relay had no lease for most of the 5 s before its report of the time `at_s`.
     fn has_expired(&self, at_s: f64) -> bool {
         let before = |span_s: f64| {
             let all = self.leaseless.iter();
@@ -212,7 +212,7 @@ impl Stage {
         self.begun.elapsed().as_secs_f64()
     }
 
-    /// Queries the state of one relay, the next one at each call, and returns the new log lines of all relays, with their numbers.
+    /// Queries the state of the next relay. Returns the new log lines of all relays with their numbers.
     fn query(&mut self) -> Vec<(usize, String)> {
         let at = self.queries % self.flown.len();
         self.queries += 1;
@@ -373,11 +373,32 @@ impl Stage {
                 failures.push(format!("{group:?}: does not end: {it}"));
             }
         }
+        self.check_others(group, &new, failures);
+        for fault in group {
+            let of = |it: &&Value| {
+                is_of(
+                    &format!(
+                        "{} {}",
+                        it["urgency"].as_str().unwrap(),
+                        it["text"].as_str().unwrap()
+                    ),
+                    &text(fault),
+                )
+            };
+            let times = new.iter().filter(of).count();
+            if times != 1 {
+                failures.push(format!("{fault:?}: {times} alarms"));
+            }
+        }
+    }
+
+    /// Checks the alarms `new` of a group about relays without a fault: there are none, or they are true.
+    fn check_others(&mut self, group: &[Fault], new: &[Value], failures: &mut Vec<String>) {
         let hurt: Vec<usize> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
         // With both ends or most relays lost, the rest of the chain has no lease for a while, and may have no quorum.
         let is_torn =
             group.iter().filter(|it| it.0 == "kill").count() > 1 || group[0].0 == "no quorum";
-        for it in &new {
+        for it in new {
             let text = it["text"].as_str().unwrap();
             let by = text.strip_prefix(NO_QUORUM);
             let is_own = by.is_some() || text.contains(LEASE);
@@ -395,22 +416,6 @@ impl Stage {
             failures.push(format!(
                 "{group:?}: no lease for {most_s:.1} s, but no alarm"
             ));
-        }
-        for fault in group {
-            let of = |it: &&Value| {
-                is_of(
-                    &format!(
-                        "{} {}",
-                        it["urgency"].as_str().unwrap(),
-                        it["text"].as_str().unwrap()
-                    ),
-                    &text(fault),
-                )
-            };
-            let times = new.iter().filter(of).count();
-            if times != 1 {
-                failures.push(format!("{fault:?}: {times} alarms"));
-            }
         }
     }
 
@@ -536,7 +541,7 @@ fn hurt(what: &str, relay: usize) -> std::ops::RangeInclusive<usize> {
     }
 }
 
-/// Returns the relays with which a text begins ("relay 3", "relays 1, 2 and 5 to 7"); none if the text is about the whole chain.
+/// Returns the relays with which a text begins ("relay 3", "relays 1, 2 and 5 to 7").
 fn subjects(text: &str) -> impl Iterator<Item = usize> {
     let words = text.strip_prefix("relays ").or(text.strip_prefix("relay "));
     let (mut numbers, mut is_range) = (BTreeSet::new(), false);
@@ -555,8 +560,9 @@ fn subjects(text: &str) -> impl Iterator<Item = usize> {
     numbers.into_iter()
 }
 
-/// Returns true if an alarm begins with `start` and no digit follows. So an alarm about relay 10 is not taken for one about relay 1.
+/// Returns true if an alarm begins with `start`. If `start` ends with a relay's number, the alarm must be about the loss of this relay.
 fn is_of(alarm: &str, start: &str) -> bool {
+    let is_lost = |rest: &str| rest.starts_with(" lost") || rest.starts_with(": no report");
     let rest = alarm.strip_prefix(start);
-    rest.is_some_and(|rest| !rest.starts_with(|it: char| it.is_ascii_digit()))
+    rest.is_some_and(|rest| is_lost(rest) || !start.ends_with(|it: char| it.is_ascii_digit()))
 }

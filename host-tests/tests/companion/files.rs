@@ -94,7 +94,7 @@ pub(crate) fn status_of(socket: impl AsRef<Path>) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
 }
 
-/// Returns the status answer of a process's socket; `None` if the process does not answer within `limit`.
+/// Returns the status answer of a process's socket; `None` without an answer within `limit`.
 pub(crate) fn status_within(socket: impl AsRef<Path>, limit: Duration) -> Option<Value> {
     let mut stream = UnixStream::connect(&socket).ok()?;
     stream.set_read_timeout(Some(limit)).unwrap();

@@ -7,6 +7,7 @@ use uav_relay::Side;
 
 use uav_relay_sim::simulator::drones::Point;
 
+use crate::drone::node;
 use crate::world::{World, beside};
 
 pub(crate) const ROUGH_S: f64 = 200.0;
@@ -39,6 +40,28 @@ pub(crate) enum FlightEvent {
     Along(usize, f64),
     /// The pilot gives control back to the motion guard.
     PilotHandsBack(usize),
+    /// The drone's motion guard learns which relay has the order to leave, by its number; 0 for none.
+    Leaver(usize, u16),
+}
+
+/// Plans orders to leave. The relays receive an order at different times, and some never.
+pub(crate) fn orders(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, FlightEvent)> {
+    let mut plan = Vec::new();
+    for _ in 0..rng.random_range(0..=6) {
+        let at_s = rng.random_range(0.0..ROUGH_S - 20.0);
+        let leaver = if rng.random_bool(0.3) {
+            0
+        } else {
+            node(rng.random_range(0..relays))
+        };
+        for k in 0..relays {
+            if rng.random_bool(0.9) {
+                let late_s = 20.0 * rng.random_range(0.0..=1.0_f64).powi(3);
+                plan.push((at_s + late_s, FlightEvent::Leaver(k, leaver)));
+            }
+        }
+    }
+    plan
 }
 
 pub(crate) fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, FlightEvent)> {

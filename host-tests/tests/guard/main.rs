@@ -6,6 +6,7 @@ mod agenda;
 mod anywhere;
 mod drone;
 mod known;
+mod leaving;
 mod medium;
 mod schedule;
 mod world;

@@ -154,6 +154,7 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     let pilots = pilots(rng, world.drones.len(), &troubles);
     plan.extend(troubles);
     plan.extend(pilots);
+    plan.extend(orders(rng, world.drones.len()));
     plan.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut plan = plan.into_iter().peekable();
     while world.now_s < ROUGH_S {
@@ -213,6 +214,11 @@ fn apply(world: &mut World, what: FlightEvent, report: &mut Report) {
         FlightEvent::Aside(k, way) => world.aside(k, way),
         FlightEvent::Along(k, share) => report.along += u64::from(world.along(k, share)),
         FlightEvent::PilotHandsBack(k) => world.drones[k].pilot_hands_back(world.now_s),
+        FlightEvent::Leaver(k, leaver) => {
+            if let Some(guard) = &mut world.drones[k].guard {
+                guard.set_leaver(leaver);
+            }
+        }
     }
 }
 
@@ -256,6 +262,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
                 guard.forget(side, false);
             }
         }
+        guard.set_leaver(0);
         guard.commit(place(*target));
     }
     let distance = f64::from(world.config.geofence.most_x_m);

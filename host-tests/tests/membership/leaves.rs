@@ -116,6 +116,21 @@ fn a_relay_at_a_wide_gap_is_refused() {
     assert_eq!(freed(&outcome, 3), None);
 }
 
+/// Checks that a relay between neighbours whose indices differ by more than four may leave once a spare between them has joined.
+#[test]
+fn a_spare_fills_a_wide_gap() {
+    for leaver in [3, 5] {
+        let mut setup = departing(8, &[(leaver, None)]);
+        setup.spares = vec![4];
+        let others = [2, 3, 5, 6].into_iter().filter(|relay| *relay != leaver);
+        setup.kills = others.map(|relay| (relay, seconds(5))).collect();
+        let outcome = run(setup.clone()).unwrap();
+        println!("relay {leaver} free after {:?} s", freed(&outcome, leaver));
+        judge(&setup, &outcome, &[1, 4, 7, 8]).unwrap();
+        assert!(freed(&outcome, leaver).is_some(), "{leaver}");
+    }
+}
+
 /// Checks that a relay without a motion guard may leave the chain only if `leave_without_guard` is set.
 #[test]
 fn without_a_guard_a_relay_is_refused() {
@@ -307,6 +322,8 @@ fn a_spare_joins_before_a_relay_leaves() {
         (2, 9),
         (8, 9),
         (5, 4),
+        (1, 3),
+        (1, 2),
     ] {
         let mut setup = departing(9, &[(leaver, None)]);
         setup.spares = vec![spare];
@@ -502,14 +519,14 @@ fn at_least(all: &[Replaced], least: f64) -> usize {
     good.count()
 }
 
-/// Checks that each relay may leave, and that the SIR is at least 0.9 of the optimum of eight relays. In 45 of 50 scenes the SIR must be at
+/// Checks that each relay may leave, and that the SIR is at least 0.98 of the optimum of eight relays. In 47 of 50 scenes the SIR must be at
 /// least 0.99 of the optimum.
 #[test]
 fn a_replacement_beside_the_line_leaves_almost_no_gap() {
     let all = replaced_in("beside the line", scene);
     assert!(all.iter().all(|one| one.free.is_some()));
-    assert_eq!(at_least(&all, 0.9), 50);
-    assert!(at_least(&all, 0.99) >= 45);
+    assert_eq!(at_least(&all, 0.98), 50);
+    assert!(at_least(&all, 0.99) >= 47);
 }
 
 /// Checks that each relay may leave wherever the interferer is.

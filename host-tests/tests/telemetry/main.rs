@@ -308,7 +308,7 @@ fn two_stations_watch() {
     }
 }
 
-/// Checks the table of the page on the screen: bytes a second with and without telemetry, on the busiest link.
+/// Checks the table of SCREEN.md: bytes a second with and without telemetry on the busiest link.
 #[test]
 fn the_page_has_the_bytes_a_second() {
     let channel = Some(Access::Csma);

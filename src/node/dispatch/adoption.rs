@@ -135,7 +135,16 @@ impl Node {
         } else {
             Leaving::respacing(&self.member.settings)
         };
-        if self.steering.steer(now, wanted, span) {
+        let leaver = match self.leaves() {
+            Some(_) if !self.steering.is_moving() => self.member.node,
+            _ => self.layers.lease.orders().leaver,
+        };
+        self.steering.set_leaver(leaver);
+        // All relays know the turn of the first renewal by then.
+        let relays = u32::from(self.member.mission.relays());
+        let lead = self.member.settings.hop_time.times(4 * relays);
+        let begin = self.layers.lease.turned_at().map(|at| at + lead);
+        if self.steering.steer(now, wanted, span, begin) {
             self.raise(Event::SetpointChanged);
         }
         self.update_goal(wanted);

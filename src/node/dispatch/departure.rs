@@ -15,7 +15,7 @@
 
 use super::{Layers, Node};
 use crate::event::{Event, NodeEvent};
-use crate::guard::HoldReason;
+use crate::guard::{Guard, HoldReason};
 use crate::node::context::{Member, longest_lease, tenths};
 use crate::node::neighbour::hearing::{CANDIDATES, mask};
 use crate::place::Placement;
@@ -125,6 +125,14 @@ impl Leaving {
         self.passed = [false; 2];
     }
 
+    /// Returns the spare that a member of the chain receives through this relay; 0 for none.
+    fn spare(&self, now: Instant, settings: &Settings) -> u16 {
+        let known = self
+            .heard_spare
+            .filter(|(_, at)| now.since(*at) < settings.dead_after);
+        known.map_or(0, |(node, _)| node)
+    }
+
     /// Returns true if the drone has arrived at its agreed position, as far as its own position is known.
     fn is_in_place(&self) -> bool {
         self.goal.is_some_and(|goal| {
@@ -158,6 +166,12 @@ impl Layers {
         let weight = 2 * relays.saturating_sub(1) + u32::from(proposer != *node);
         let [before, after] =
             [Side::Upstream, Side::Downstream].map(|side| self.neighbours.at(side).node());
+        // A spare between this relay and a neighbour joins first.
+        let width = match self.leaving.spare(now, settings) {
+            0 => after.saturating_sub(before),
+            spare if spare < *node => after.saturating_sub(spare),
+            spare => spare.saturating_sub(before),
+        };
         let blocked = settings.dead_after.times(BLOCKED_AFTER);
         let ordered_for = self.leaving.ordered_at.map(|at| now.since(at));
         if settings.wiring == Wiring::Pair {
@@ -166,7 +180,7 @@ impl Layers {
             Some(Departure::NeedsGuard)
         } else if relays < 2 || settings.quorum && weight <= relays {
             Some(Departure::NeedsQuorum)
-        } else if before != 0 && after.saturating_sub(before) > CANDIDATES {
+        } else if before != 0 && after != 0 && width > CANDIDATES {
             Some(Departure::WideGap)
         } else if ordered_for.is_some_and(|span| blocked <= span && span < blocked.times(2)) {
             Some(Departure::Blocked)
@@ -180,18 +194,16 @@ impl Layers {
         let Leaving {
             requested,
             lasts_until,
-            heard_spare,
             ..
         } = self.leaving;
         // 0 is the mark of the relay that has the order to leave.
         let endurance_s = lasts_until.map_or(u16::MAX, |at| (tenths(at.since(now)) / 10).max(1));
         let leaves = requested && self.departure_refusal(now, member).is_none();
         let ordered = self.lease.orders().leaver == member.node;
-        let known = heard_spare.filter(|(_, at)| now.since(*at) < member.settings.dead_after);
         let requests = Requests {
             leaver: if leaves { member.node } else { 0 },
             endurance_s: if ordered || !leaves { 0 } else { endurance_s },
-            spare: known.map_or(0, |(node, _)| node),
+            spare: self.leaving.spare(now, &member.settings),
             in_place: self.leaving.is_in_place(),
         };
         self.lease.set_requests(requests);
@@ -260,10 +272,10 @@ impl Node {
     }
 
     /// Makes this relay a spare outside of the chain. The call has no effect if the relay has taken part in the
-    /// protocol since its start, is the leader, has requested to leave, or has two wires.
+    /// protocol since its start, has requested to leave, or has two wires.
     pub(crate) fn wait_as_spare(&mut self, now: Instant) {
         let leaving = &self.layers.leaving;
-        let may = self.searches() && self.layers.round.is_fresh() && !leaving.requested;
+        let may = self.searches() && self.is_untouched() && !leaving.requested;
         if may && !leaving.is_outside() {
             self.go_outside(now, true);
         }
@@ -395,7 +407,10 @@ impl Node {
         } else {
             self.layers.round.agreed_place()
         };
-        self.layers.leaving.goal = goal.filter(|_| !self.steering.is_moving());
+        // The fences beside a relay that leaves are as near as its interval of possible positions.
+        let waits = self.layers.leaving.requested
+            && !self.steering.known_guard().is_none_or(Guard::is_still);
+        self.layers.leaving.goal = goal.filter(|_| !self.steering.is_moving() && !waits);
     }
 
     /// Follows the leader's orders in the last lease renewal.
@@ -434,6 +449,13 @@ impl Node {
                 Side::Downstream => index.saturating_add(1) >= mission.relays(),
             };
             if is_end {
+                // First the fence beside the relay that leaves moves up to it.
+                self.steer(now);
+                if side == Side::Downstream
+                    && !self.steering.known_guard().is_none_or(Guard::is_answered)
+                {
+                    continue;
+                }
                 self.layers.neighbours.at_mut(side).give_up(now, true);
                 self.steering.set_neighbour(side, None);
                 self.schedule_hello(side, orders.leaver, true);
@@ -475,7 +497,16 @@ impl Node {
                 leaving.free = true;
                 self.raise(Event::MayLeave);
             } else if hello.ready && !hello.fresh && leaving.is_spare() {
-                self.come_back(now);
+                // From a hover the drone begins at once. One that does not hover in time joins all the same.
+                let called_at = *leaving.ordered_at.get_or_insert(now);
+                if self
+                    .steering
+                    .known_guard()
+                    .is_none_or(|guard| guard.may_begin(now))
+                    || now.since(called_at) >= settings.dead_after
+                {
+                    self.come_back(now);
+                }
             }
             return true;
         }

@@ -3,6 +3,7 @@
 use super::Node;
 use crate::event::NodeEvent;
 use crate::features::{DEPARTURES, UPLOAD};
+use crate::guard::Guard;
 use crate::node::mission_update::accepts_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::node::neighbour::state::Candidate;
@@ -256,8 +257,12 @@ impl Node {
         // The candidate's neighbour is farther away than this relay, so the candidate would prefer this relay.
         let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
         let before = neighbour.node();
-        // The candidate is the node beyond a neighbour that is ordered to leave.
-        let passes = leaver != 0 && leaver == before && [own, leaver].contains(&hello.neighbour);
+        // The node beyond a neighbour that is ordered to leave, once that one has received the fence beside it.
+        let passes = leaver != 0
+            && leaver == before
+            && [own, leaver].contains(&hello.neighbour)
+            && (side == Side::Upstream
+                || self.steering.known_guard().is_none_or(Guard::is_answered));
         let taken = hello.neighbour != own && hello.neighbour != 0 && !farther && !passes;
         if taken || !hello.is_heard(from, own) {
             return;

@@ -235,7 +235,9 @@ mod tests {
             let (after, report) = next(&mut node, at, ms(20_000)).unwrap();
             at = at + after;
             if relays(&report).contains(&1) {
-                assert!(at.since(now) <= period, "{:?} {period:?}", at.since(now));
+                // The other relay's report has used a part of this relay's share of the data rate.
+                let most = Duration::from_micros(period.as_micros() * 3 / 2);
+                assert!(at.since(now) <= most, "{:?} {period:?}", at.since(now));
                 break;
             }
         }
@@ -250,7 +252,7 @@ mod tests {
             (1, Wiring::Pair, 0),
         ] {
             let mut node = watched(index, wiring);
-            let now = NOW + ms(1_000);
+            let now = NOW + ms(700);
             node.reporting.handle_timeout(now);
             node.report_control(BLIND);
             let (after, report) = next(&mut node, now, ms(5_000)).unwrap();
@@ -261,7 +263,7 @@ mod tests {
     #[test]
     fn further_changes_do_not_delay_an_alarm() {
         let mut node = watched(1, Wiring::Shared);
-        let now = NOW + ms(1_000);
+        let now = NOW + ms(700);
         for (step, control) in (0..3).zip([BLIND, STANDBY, BLIND]) {
             let now = now + ms(100 * step);
             assert!(step == 0 || reported(&mut node, now).is_none());

@@ -318,8 +318,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. Of two departures the more urgent one counts, of two spares the
-    /// one with the lower number.
+    /// Merges the requests of two parts of the chain. If both parts have a departure, the more urgent one counts. If
+    /// both have a spare, that of the more urgent departure counts; without a departure that with the lower number.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
@@ -329,6 +329,7 @@ impl Requests {
         };
         let spare = match (self.spare, other.spare) {
             (0, spare) | (spare, 0) => spare,
+            _ if urgent.leaver != 0 => urgent.spare,
             (one, other) => one.min(other),
         };
         Self {

@@ -432,9 +432,6 @@ fn switched_on(
     };
     let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
     relay.set_reserve(setup.reserve);
-    if setup.spares.contains(&index) {
-        relay.wait_as_spare(now);
-    }
     if let Some(upload) = stored {
         let resumed = relay.resume(upload);
         debug_assert_eq!(resumed, Ok(()), "the upload was made for this mission");
@@ -442,6 +439,9 @@ fn switched_on(
     if let Some(record) = record {
         let resumed = relay.resume_view(now, record);
         debug_assert_eq!(resumed, Ok(()), "the record was made by this relay");
+    }
+    if setup.spares.contains(&index) {
+        relay.wait_as_spare(now);
     }
     Ok(relay)
 }

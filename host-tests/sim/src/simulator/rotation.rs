@@ -88,6 +88,8 @@ pub(super) struct Battery {
     /// True once the drone, after it joined, has been within 3 m of its agreed position. From then on the data must
     /// be routed over this drone.
     pub(super) is_settled: bool,
+    /// True once the operators have reported that the drone has left the line on its way home.
+    pub(super) is_reported: bool,
 }
 
 /// Result of a run with replacements.

@@ -20,7 +20,10 @@ fn a_fleet_of_twelve_replaces_its_tired_drones() {
             let replaced = figures[kind]["replaced"].as_u64().unwrap();
             assert!(replaced >= 8, "{kind}: {figures}");
         }
-        let nearest_m = figures["announced"]["nearest_m"].as_f64().unwrap();
+        let announced = &figures["announced"];
+        assert_eq!(announced["forced"], 0, "{figures}");
+        assert!(announced["below"].as_f64().unwrap() < 0.02, "{figures}");
+        let nearest_m = announced["nearest_m"].as_f64().unwrap();
         assert!(nearest_m >= SEPARATION_M - 2.0 * ERROR_M, "{figures}");
     }
 }

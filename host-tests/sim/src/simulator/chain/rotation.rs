@@ -31,10 +31,10 @@ const TAKE_OFFS: Duration = Duration::from_millis(8_000);
 const ARRIVED_M: f64 = 0.5;
 
 /// Time by which a spare reaches its place beside the line before it is needed, s.
-const EARLY_S: f64 = 25.0;
+const EARLY_S: f64 = 40.0;
 
 /// Time before a drone has to fly home, s, from which its relay requests to leave even without a spare.
-const DEADLINE_S: f64 = 80.0;
+const DEADLINE_S: f64 = 40.0;
 
 /// Time for which a drone must hover at its waiting place before it counts as a spare. Only then is a departure
 /// requested.
@@ -94,6 +94,7 @@ impl Chain {
                 tube: None,
                 hovers_since: Instant::ZERO,
                 is_settled: true,
+                is_reported: false,
             });
             if let Some(member) = self.members.get_mut(index)
                 && !is_first
@@ -238,7 +239,7 @@ impl Chain {
                 .is_some_and(|it| it.duty == Duty::Standby);
             let gap = Self::gap(&rotation, index);
             let [from_m, to_m] = Self::gap_m(&rotation, &flight, gap, distance_m);
-            let part_m = (to_m - from_m) / 4.0;
+            let part_m = 5.0_f64.min((to_m - from_m) / 4.0);
             // A pilot keeps a spare beside its gap.
             if let Some(drone) = flight.drones.get_mut(index)
                 && waits
@@ -481,6 +482,7 @@ impl Chain {
         };
         battery.duty = Duty::Home { path, tube };
         battery.tube = None;
+        battery.is_reported = false;
         let waited_s = battery
             .requested
             .take()
@@ -535,11 +537,10 @@ impl Chain {
         starts.reverse();
         let serving = starts.len();
         self.send_spares(rotation, flight, &starts, serving);
-        let spares = rotation
-            .drones
-            .iter()
-            .filter(|it| it.duty == Duty::Standby && now.since(it.hovers_since) >= HOVERS)
-            .count();
+        let standby = rotation.drones.iter().filter(|it| it.duty == Duty::Standby);
+        let (waiting, moving): (Vec<_>, Vec<_>) =
+            standby.partition(|it| now.since(it.hovers_since) >= HOVERS);
+        let spares = if moving.is_empty() { waiting.len() } else { 0 };
         let mut requests = 0;
         for (at, (index, start_s, left_s)) in starts.into_iter().enumerate() {
             let Some(drone) = rotation.drones.get_mut(index) else {
@@ -553,7 +554,7 @@ impl Chain {
                 continue;
             }
             requests += usize::from(drone.requested.is_some());
-            let is_due = left_s <= DEADLINE_S || start_s <= 2.0 * EARLY_S && spares > requests;
+            let is_due = left_s <= DEADLINE_S || start_s <= EARLY_S && spares > requests;
             let is_due = is_due && at < 2 && rotation.record.complete_at.is_some();
             if drone.requested.is_none() && is_due {
                 drone.requested = Some(now);
@@ -570,7 +571,37 @@ impl Chain {
                 self.go_home(rotation, flight, index, true);
             }
         }
+        self.call_spare(rotation);
         self.report_gone(rotation, flight);
+    }
+
+    /// Simulates an operator who lets one waiting spare join if relays are missing, and none joins already.
+    fn call_spare(&mut self, rotation: &Rotation) {
+        let now = self.now;
+        let mut present = 0;
+        let mut waiting = None;
+        for (index, (member, drone)) in self.members.iter().zip(&rotation.drones).enumerate() {
+            let departure = member.relay.departure(now);
+            let is_on = member.killed.is_none();
+            match drone.duty {
+                // One after the other: a spare joins once no drone is about to leave.
+                Duty::Serving if departure == Departure::Outside => return,
+                Duty::Serving => present += u16::from(is_on && departure != Departure::Free),
+                Duty::Standby if is_on && departure == Departure::Member => return,
+                Duty::Standby if is_on && now.since(drone.hovers_since) >= HOVERS => {
+                    waiting = waiting.or(Some(index));
+                }
+                _ => {}
+            }
+        }
+        if rotation.spec.announced
+            && present < rotation.spec.flying
+            && let Some(index) = waiting
+            && let Some(member) = self.members.get_mut(index)
+        {
+            member.relay.stay(now);
+            self.drain(index);
+        }
     }
 
     /// Sends at most one spare to the line, if fewer spares wait there than are needed soon.
@@ -703,29 +734,35 @@ impl Chain {
         }
     }
 
-    /// Simulates operators: they report to a relay that the drones of lost neighbours have left the line.
-    fn report_gone(&mut self, rotation: &Rotation, flight: &Flight) {
+    /// Simulates operators: they report to the relays beside it that a drone has left the line.
+    ///
+    /// They do so once when it has left, and to a relay that waits for it.
+    fn report_gone(&mut self, rotation: &mut Rotation, flight: &Flight) {
         let now = self.now;
-        let is_on_line = |index: usize| {
-            let drone = rotation.drones.get(index);
-            let is_away = drone.is_none_or(|drone| match &drone.duty {
-                Duty::Ground(_) | Duty::Rising { .. } | Duty::Standby => true,
-                Duty::Serving => false,
-                Duty::Home { .. } => flight
-                    .true_position(index)
-                    .is_some_and(|at| at[1].abs() >= rotation.spacing_m),
-            });
-            !is_away
+        let is_clear = |index: usize| {
+            flight
+                .true_position(index)
+                .is_some_and(|at| at[1].abs() >= rotation.spacing_m)
         };
+        let drones = rotation.drones.iter().enumerate();
+        let seen: Vec<(bool, bool)> = drones
+            .map(|(index, drone)| match drone.duty {
+                Duty::Ground(_) | Duty::Rising { .. } | Duty::Standby => (false, false),
+                Duty::Serving => (true, false),
+                Duty::Home { .. } => {
+                    let is_clear = is_clear(index);
+                    (!is_clear, is_clear && !drone.is_reported)
+                }
+            })
+            .collect();
+        for (drone, (_, has_left)) in rotation.drones.iter_mut().zip(&seen) {
+            drone.is_reported |= has_left;
+        }
         for index in 0..self.members.len() {
             for side in [Side::Upstream, Side::Downstream] {
                 let Some(member) = self.members.get(index).filter(|it| it.killed.is_none()) else {
                     continue;
                 };
-                let reason = member.relay.hold_reason(side);
-                if !matches!(reason, Some(HoldReason::Lost | HoldReason::NotFlown)) {
-                    continue;
-                }
                 let [before, after] = member.relay.neighbours();
                 let (from, to) = match side {
                     Side::Upstream => (before.map_or(0, usize::from), index),
@@ -734,7 +771,11 @@ impl Chain {
                         after.map_or(self.members.len(), |it| usize::from(it) - 1),
                     ),
                 };
-                if !(from..to).any(is_on_line)
+                let between = seen.get(from..to).unwrap_or_default();
+                let reason = member.relay.hold_reason(side);
+                let waits = matches!(reason, Some(HoldReason::Lost | HoldReason::NotFlown));
+                if (waits || between.iter().any(|(_, has_left)| *has_left))
+                    && !between.iter().any(|(is_on_line, _)| *is_on_line)
                     && let Some(member) = self.members.get_mut(index)
                 {
                     member.relay.clear_lost(now, side);
