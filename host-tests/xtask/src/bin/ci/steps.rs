@@ -361,9 +361,9 @@ fn embassy() -> Vec<Step> {
 ///
 /// `set` is a list of features with commas between them.
 ///
-/// The exhaustive model check of views depends on no feature, and takes most of the time of the library's tests. It runs
-/// only with no feature and with all features. The remaining tests take seconds, so the library is not optimised for
-/// them.
+/// The exhaustive model check of views depends on no feature, and takes most of the time of the library's tests. It
+/// runs only with no feature and with all features. The remaining tests take seconds, so the library is not optimised
+/// for them.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
