@@ -27,7 +27,7 @@ pub(crate) struct Steering {
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
-/// Motion to a new agreed position: start time, duration, time of the next step, and number of steps made.
+/// Motion to a new agreed position: start, duration, time of the next step, steps made.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     since: Instant,
@@ -321,7 +321,7 @@ mod tests {
         Instant::ZERO + Duration::from_millis(ms)
     }
 
-    /// Checks that relays that learn their positions at different times begin together, once they know when.
+    /// Checks that relays that learn their positions at different times move together.
     #[test]
     fn relays_begin_at_the_same_time() {
         let span = Duration::from_millis(20_000);
