@@ -289,7 +289,7 @@ impl Lease {
     /// Returns the time at which this view's first renewal turned at the last relay; `None` if unknown.
     ///
     /// Each relay takes it as the middle between its forwarding of the renewal and its reception of the reply, so that
-    /// all relays know about the same time, without a common clock.
+    /// all relays know about the same time, without a common clock. `None` until it is known.
     pub(crate) fn turned_at(&self) -> Option<Instant> {
         self.departures.first()?.turned_at
     }
