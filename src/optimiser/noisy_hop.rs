@@ -39,8 +39,8 @@ use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum ratio of a hop's target SIR to its gain; with a larger ratio no hop is short enough. All numbers stay
-/// finite.
+/// Maximum ratio of a hop's target SIR to its gain. With a larger ratio no hop is short enough. The limit keeps all
+/// numbers finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
@@ -166,7 +166,7 @@ impl NoisyHop {
     }
 
     /// Returns the largest hop length from `low` to `high`, m, that meets the target. `None` if there is none. The
-    /// margin g is 0 there; at lengths that meet the target it is 0 or above.
+    /// margin g is 0 at the result; at lengths that meet the target it is 0 or above.
     ///
     /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
@@ -191,8 +191,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 there; at
-    /// lengths that meet the target it is 0 or above.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 at the result;
+    /// at lengths that meet the target it is 0 or above.
     ///
     /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {

@@ -60,8 +60,8 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference between cubic and linear interpolation for which the cubic result is used. The unit is the gap
-/// between two targets.
+/// Maximum difference between cubic and linear interpolation at which the cubic result is used. The unit is the gap
+/// between the two targets around the result.
 const BEND: f32 = 0.25;
 
 /// Maximum ratio of the bracket's width after a pass to its width before. With a larger ratio the next targets are
@@ -78,8 +78,7 @@ pub struct Search {
     tolerance: f32,
     /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
     ceiling: f32,
-    /// First target of the fixed-step schedule, and upper bound of the bracketed schedule. It is gamma_0 of the
-    /// paper.
+    /// First target of the fixed-step schedule (gamma_0 of the paper), or upper bound of the bracketed one.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
@@ -160,8 +159,8 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next targets by `ladder`, which the leader expects to end the search. If `ladder` is for a plain
-    /// pass, all later passes are plain, too.
+    /// Replaces the next list of targets by `ladder`, which the leader expects to end the search. If `ladder` is for a
+    /// plain pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
@@ -284,8 +283,8 @@ impl Search {
 
 /// Lowers the targets `start` and `met` to allow for data from Rx to Tx, and returns both.
 ///
-/// `start` is the upper bound of the search. It becomes at most the maximum SIR of the backward hop to Tx. `met` is a
-/// feasible target. It becomes a target that this hop and the backward hop from Rx also meet.
+/// `start` is the upper bound of the search. It is limited to the maximum SIR of the backward hop to Tx. `met` is a
+/// feasible target. It is lowered until the backward hop to Tx and the backward hop from Rx meet it, too.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -350,8 +349,8 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest target that all relays accepted, and the ladder that proposes it again. `None` until a target is
-    /// accepted.
+    /// Highest target that all relays accepted, and the ladder (list of targets) for another pass with it. `None` until
+    /// a target is accepted.
     best: Option<(f32, Ladder)>,
     /// True once the bisection has ended. The best target found is then the result.
     over: bool,
@@ -360,8 +359,9 @@ struct StandTrials {
 impl Search {
     /// Returns the target that a relay has refused in the last pass; `None` if there is none.
     ///
-    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the commit
-    /// from `verdict`, the result of the pass. The refused target follows from the slacks in `verdict`.
+    /// A relay refuses a target if it cannot take the position that the next relay requires. That relay deletes the
+    /// committed target from `verdict`, the result of the pass. The refused target follows from the slacks in
+    /// `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
