@@ -64,10 +64,10 @@ pub enum Method {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
-    /// Maximum number of rounds, the paper's `Iter_max`. In a round every relay may move once. Algorithm 2 ends after a
-    /// round in which no relay moves.
+    /// Maximum number of rounds, the paper's `Iter_max`. In a round each relay moves at most once. Algorithm 2 ends
+    /// after a round in which no relay moves.
     pub rounds: u16,
-    /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
+    /// Maximum change of a relay's altitude in one move, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
     /// Search method for a relay's better position.
     pub local: Local,
@@ -113,7 +113,7 @@ pub struct Measure {
 pub struct Settings {
     /// Altitude and power of this relay; `None` for the values that the mission gives.
     pub profile: Option<Profile>,
-    /// True to keep this relay's altitude fixed while the method optimises other relays' altitudes.
+    /// True to keep this relay's altitude fixed, although the method optimises altitudes.
     pub hold_altitude: bool,
     /// Method that the leader runs; the other relays follow. The leader is relay 1, or relay N if the mission gives
     /// the interference as a distribution along x.
@@ -126,8 +126,8 @@ pub struct Settings {
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one round
-    /// trip of messages along the chain is enough. It has an effect only with the bracketed schedule.
+    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is correct, one
+    /// round trip of messages along the chain is enough. This setting has an effect only with the bracketed schedule.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
@@ -142,7 +142,7 @@ pub struct Settings {
     pub probe_after: Duration,
     /// Minimum silence after which a neighbour counts as lost, and minimum duration of a lease. Above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the previous view's
+    /// True if a part of a split chain needs a quorum to continue. A quorum is more than half of the previous view's
     /// members, or exactly half including the view's proposer. Without this rule, the parts of a split chain would
     /// interfere with each other.
     pub quorum: bool,
@@ -154,14 +154,14 @@ pub struct Settings {
     /// Duration of the move to a new position on which the chain has agreed (feature `departures`). The setpoint moves
     /// in 32 equal steps; with 0 it moves in one step.
     ///
-    /// If all drones arrive together, no hop is worse on the way than before or after
-    /// ([`docs::batteries`](crate::docs::batteries)). The longest way is about a spacing of the chain. Choose the
-    /// duration so that drones fly it at their usual speed or slower. Use the same value for all relays of a chain, at
-    /// most four times `dead_after`.
+    /// If all drones arrive together, no hop is worse during the move than before or after it
+    /// ([`docs::batteries`](crate::docs::batteries)). The longest move is about the distance between two neighbours.
+    /// Choose the duration so that drones fly it at their usual speed or slower. Use the same value for all relays of a
+    /// chain, at most four times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
     /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
-    /// its drone, which still waits at its place. At an end of the chain they come as close as a few metres.
+    /// its drone, which still waits at its position. At an end of the chain they come within a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
@@ -267,7 +267,7 @@ impl Settings {
             .with_probe_after(probe_after)
     }
 
-    /// Returns the settings with another `probe_after`, and with three times this value as `dead_after`.
+    /// Returns the settings with this `probe_after`, and with three times this value as `dead_after`.
     #[must_use]
     pub const fn with_probe_after(self, probe_after: Duration) -> Self {
         Self {
@@ -277,7 +277,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with at least the minimum `hop_time` for a channel of `baud` bit/s and `load`.
+    /// Returns the settings with `hop_time` at least at the minimum for `load` and a channel of `baud` bit/s.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {
@@ -303,8 +303,8 @@ pub enum SetupError {
     /// not [`Method::Align`]. Or the method is [`Method::Joint`], and the chain has more than 100 relays. Or the method
     /// needs a feature that the crate was built without.
     Method,
-    /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
-    /// traffic in both directions this method needs a known interferer.
+    /// The method Joint is used with `listen`, although the mission has data from Rx to Tx (`reverse`). For data in
+    /// both directions this method needs a known interferer.
     Reverse,
     /// The mission has fitted slots (`fitted_gap` above 0), but the method is not Joint. Or `listen` is set, or the
     /// interferer is unknown.

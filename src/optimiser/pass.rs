@@ -48,7 +48,7 @@ pub struct Behind {
 }
 
 impl Behind {
-    /// Returns a previous relay with the altitude and power `profile`, lateral offset 0, and no measurement.
+    /// Returns a previous relay with the altitude and power `profile`, on the line, without a measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),

@@ -32,7 +32,7 @@ pub enum Unfit {
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance the
-/// measurements do not show if the source is to the right or to the left of the line Tx to Rx.
+/// measurements do not show on which side of the line Tx to Rx the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -52,13 +52,13 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit determines all four unknowns. False if it leaves out the last one, which shows if the source is
-    /// to the right or to the left of the line Tx to Rx.
+    /// True if the fit determines all four unknowns. False if it leaves out the last one, which tells on which side of
+    /// the line Tx to Rx the source is.
     full_rank: bool,
 }
 
-/// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
-/// separate the unknowns of the fit.
+/// Minimum pivot of the matrix factorisation, relative to the first pivot. With a smaller pivot, the measured positions
+/// cannot separate the unknowns of the fit.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -223,8 +223,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and a small variance. It must be below four times the
-    /// variance that the operator expects.
+    /// Returns true if the fit has more positions than unknowns, and a small variance. The variance must be below four
+    /// times the variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -258,7 +258,7 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// The measured positions may not determine if the source's y is above or below their mean y. It is then on the
+    /// If the measured positions do not determine on which side of their mean y the source is, the result is on the
     /// side of `side_m`, a lateral offset y.
     ///
     /// # Errors
@@ -322,8 +322,8 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative error of the measurements if a source had these `coefficients`. `sums` are the sums
-/// of the measurements.
+/// Returns the mean square relative error of the measurements for a source with these `coefficients`. `sums` are the
+/// sums of the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [products @ .., av, bv, cv, dv, vv, count, _, _] = sums.numbers.map(f64::from);
     let [a, b, c, d] = *coefficients;
@@ -349,7 +349,7 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
 }
 
 /// Half width of the square searched for a source, in units of D / 2; D is the distance from Tx to Rx. The square
-/// reaches from D before Tx to D beyond Rx, and 1.5 D to each side.
+/// reaches from x = -D to x = 2 D, and from y = -1.5 D to y = 1.5 D.
 const FARTHEST: f32 = 3.0;
 
 /// Number of grid steps from the middle to the edge of the first grid of the search for a source.

@@ -23,7 +23,7 @@ impl Key {
         Self(bytes)
     }
 
-    /// Returns the authentication tag of `signed`, the header and body of a frame. `sender` and `receiver` are the
+    /// Returns the authentication tag for `signed`, the header and body of a frame. `sender` and `receiver` are the
     /// nonces of the frame's sender and receiver.
     ///
     /// Work: two to five blocks of BLAKE2s.
@@ -64,8 +64,8 @@ pub struct Auth {
     /// Secret key that authenticates the frames of the network.
     pub key: Key,
     /// Start counter of this relay, from 1, larger at every start. Use a number in flash that is incremented before
-    /// use, or the seconds of a clock that never runs backward. With a reused epoch, frames recorded in it are accepted
-    /// again.
+    /// use, or the seconds of a clock that never runs backward. If an epoch is reused, frames that were recorded in
+    /// this epoch are accepted again.
     pub epoch: u32,
 }
 
@@ -108,7 +108,7 @@ impl Nonces {
     }
 }
 
-/// Key and nonces of one node for authenticating its frames to another.
+/// Key and nonces with which one node signs its frames to a second node.
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
     pub(crate) key: &'a Key,

@@ -129,7 +129,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the chain for `target`, m, and its derivatives by the last relay's position, `at`.
+    /// Returns the slack of the chain for `target`, m, and its derivatives. They are by the last relay's position `at`.
     ///
     /// The slack is the maximum length of the last hop for `target`, minus the length of this hop.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {

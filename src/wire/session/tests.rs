@@ -337,8 +337,8 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks which frames under the relay's own number reveal another node with that number. Only a handshake with the
-/// same key, and with an epoch that is not older, reveals it.
+/// Checks which frames under the relay's own number reveal a second node with that number. Only a handshake with the
+/// same key, and with an epoch that is not older than the relay's, does.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
