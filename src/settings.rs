@@ -277,7 +277,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with `hop_time` at least at the minimum for `load` and a channel of `baud` bit/s.
+    /// Returns the settings with a `hop_time` long enough for `load` and a channel of `baud` bit/s.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {

@@ -777,8 +777,8 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or the last hop that halves its length, compared with the inner hops. In the best
-/// chain all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
+/// Factor on the gain of the first or the last hop that makes it half as long as an inner hop. In the best chain all
+/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {

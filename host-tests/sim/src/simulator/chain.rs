@@ -34,7 +34,8 @@ use ground::{Station, stations};
 use judge::ChangedRelays;
 pub use live::LiveRelay;
 
-/// Largest number of events in a run. It ends runs in which the relays never settle, after some minutes of computing.
+/// Largest number of events in a run. It ends runs in which the relays never agree on positions, after some minutes of
+/// computing.
 const MAX_EVENTS: u64 = 400_000_000;
 
 impl Chain {
@@ -80,7 +81,7 @@ impl Chain {
         self.update_statistics(changed);
     }
 
-    /// Passes `samples` interference samples to every living relay that has a setpoint.
+    /// Gives `samples` interference samples to every living relay that has a setpoint.
     ///
     /// `draw` returns a random sample, W, at a position.
     pub fn measure(
@@ -331,7 +332,7 @@ struct Member {
     /// Outgoing serial lines: the first toward Tx or to a shared channel, the second toward Rx.
     lines: [Line; 2],
     killed: Option<Instant>,
-    /// True if the relay controlled its drone at the last time step of the flight.
+    /// True if the relay controlled its drone at the previous time step of the flight.
     under_relay_control: bool,
     starts: u32,
     /// Number of passes and view proposals that the relay began before its last start.
@@ -343,8 +344,8 @@ struct Member {
     record: Option<ViewRecord>,
     /// Last setpoint that [`Chain::check`] found within the limits, so that it is not checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of all setpoints since the relay last got its first one. With a guard, a
-    /// setpoint may be outside of the geofence only within this range.
+    /// Smallest and largest coordinates of all setpoints since the relay last had none. With a guard, a setpoint may be
+    /// outside of the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -591,7 +592,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
     Ok(members)
 }
 
-/// Queues the restarts of autopilots, and the landings of drones that a pilot never hands back.
+/// Queues the restarts of autopilots, and the landings of drones whose pilot never hands them back.
 ///
 /// Returns the number of these events.
 fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
@@ -647,15 +648,15 @@ pub enum QueuedEvent {
     Kill,
     /// The relay is switched on again.
     Boot,
-    /// The relay requests to leave the chain, with this remaining endurance, s.
+    /// The relay requests to leave the chain. The field is its drone's remaining endurance, s, if known.
     Leave(Option<u16>),
-    /// The relay gets its drone's endurance beyond the way home, s.
+    /// The relay is told its drone's remaining endurance beyond the way home, s.
     Endurance(u16),
     /// The relay cancels its departure.
     Stay,
     /// A partition or a one-way link failure begins or ends.
     Partition,
-    /// A radio on the shared channel reaches its next step, such as the end of a frame.
+    /// An event of a radio on the shared channel is due, such as the end of a frame.
     ///
     /// The event's relay index is unused.
     Air(AirEvent),

@@ -7,7 +7,7 @@ use rand::RngExt;
 use uav_relay::wire::frame::MAX_SWEEP;
 use uav_relay::{Duration, Instant};
 
-/// Probability of each fault of a frame, 0 to 0.9. Faults are independent: several may hit one frame.
+/// Probability of each fault of a frame, 0 to 0.9. Faults are independent: one frame may have several.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
     /// Probability that a frame never arrives.
@@ -103,7 +103,7 @@ impl Faults {
     }
 }
 
-/// Model of bursts of losses (Gilbert-Elliott): each direction of a link is in a good or a bad state.
+/// Model of bursts of losses (Gilbert-Elliott). Each direction of a link is in a good or a bad state.
 ///
 /// In the bad state the link loses all frames, in the good state no frames.
 #[derive(Debug)]
@@ -123,7 +123,7 @@ pub struct Bursts {
 impl Bursts {
     /// Creates the model for a mean fraction `share` of lost frames, 0 to 0.9.
     ///
-    /// The mean length of a burst is `length` frames, at least [`Bursts::shortest`].
+    /// `length` is the mean length of a burst, frames: at least [`Bursts::shortest`].
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {
@@ -136,7 +136,7 @@ impl Bursts {
 
     /// Returns the mean number of successive losses if each frame is lost with the probability `share`.
     ///
-    /// It is the shortest mean burst that [`Bursts::new`] accepts.
+    /// The result is the smallest mean length that [`Bursts::new`] accepts.
     pub fn shortest(share: f64) -> f64 {
         1.0 / (1.0 - share)
     }
@@ -210,7 +210,7 @@ impl LinkSpec {
     }
 }
 
-/// Serial line that sends one frame after the other. It knows until when it is busy.
+/// Serial line that sends one frame after the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
     free: Instant,

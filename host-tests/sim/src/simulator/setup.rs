@@ -15,7 +15,7 @@ use super::medium::Access;
 use super::rotation::RotationSpec;
 use super::true_interference::TrueInterference;
 
-/// Period in which relays 1 to `after` and the other relays do not receive each other.
+/// Period in which relays 1 to `after` and the relays beyond `after` do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Partition {
     /// Number, from 1, of the relay after which the partition cuts the chain.
@@ -45,7 +45,7 @@ pub struct UploadSpec {
     pub upload: Upload,
 }
 
-/// Data rate and number of users of a link or a radio channel.
+/// Data rate of a link or radio channel, the number of relays that share it, and a frame's overhead.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Channel {
     /// Data rate of the link or the channel, bit/s.
@@ -129,7 +129,7 @@ pub struct Setup {
     ///
     /// Otherwise it is at least [`Bursts::shortest`](super::faults::Bursts::shortest).
     pub burst: f64,
-    /// One-way link failures: periods in which one relay does not receive another relay.
+    /// One-way link failures: periods in which relay `by` does not receive relay `of`.
     pub deaf: Vec<OneWayFailure>,
     /// True interferers, which relays measure and have to locate; `None` if relays do not measure them.
     pub true_interference: Option<TrueInterference>,
@@ -152,7 +152,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Default of [`Self::radio_reach`]: a relay receives up to four relays on each side.
+    /// Default of [`Self::radio_reach`]: a relay receives four relays toward Tx and four toward Rx.
     pub const RADIO_REACH: usize = 4;
 
     /// Creates the setup of a fault-free run of `mission`, with default settings, default links and seed 1.
@@ -215,7 +215,7 @@ impl Setup {
         self
     }
 
-    /// Returns the data rate and the number of users of the links or the channel.
+    /// Returns the data rate, relays in range, and frame overhead of the run's links or shared channel.
     pub fn channel(&self) -> Channel {
         let near = match self.settings.wiring {
             Wiring::Pair => 1,
@@ -235,7 +235,7 @@ impl Setup {
         }
     }
 
-    /// Returns the number of relays that share the channel within radio range, and a frame's overhead.
+    /// Returns the load of the shared channel: the number of relays in radio range, and a frame's overhead.
     ///
     /// `None` if senders do not interfere with each other: on separate lines and on an ideal channel.
     pub fn load(&self) -> Option<ChannelLoad> {

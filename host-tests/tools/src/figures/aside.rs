@@ -50,11 +50,11 @@ struct Row {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
-    /// Best SIR of a relay on the line Tx-Rx at the lowest altitude, linear.
+    /// Best SIR of a relay with y = 0 at the lowest altitude, linear.
     line_sir_linear: f32,
-    /// Best SIR of a relay on the line Tx-Rx at any permitted altitude, linear.
+    /// Best SIR of a relay with y = 0 at any permitted altitude, linear.
     altitude_sir_linear: f32,
-    /// Best SIR of a relay beside the line Tx-Rx at the lowest altitude, linear.
+    /// Best SIR of a relay with any permitted y at the lowest altitude, linear.
     side_sir_linear: f32,
     both_sir_linear: f32,
     both_altitude_m: f32,

@@ -28,7 +28,7 @@ pub const LOCATED: f64 = 0.1;
 /// Number of positions of the interferer that are simulated.
 const SIMULATED: usize = 5;
 
-/// Fraction of the best SIR that a chain must reach after the location: 1 dB less.
+/// Fraction of the best SIR (-1 dB) that a chain must have once the interferer is located.
 const SHARE: f64 = 0.794;
 
 /// Longest time of a simulated search, s, in addition to a flight from Tx to Rx at 10 m/s.
@@ -47,7 +47,7 @@ pub struct Search {
     /// Absent if the relays do not reach such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placed_s: Option<f64>,
-    /// Distance of the last estimate from the interferer, or from its mirror image at the line Tx-Rx, m.
+    /// Distance of the last estimate from the interferer, or from its mirror image about the line Tx-Rx, m.
     ///
     /// Absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -150,7 +150,7 @@ fn is_located(scenario: &Scenario, cell: &Cell) -> bool {
     cell.error_m.is_some_and(|error| error <= LOCATED * apart_m)
 }
 
-/// Returns the positions at which the relays measure: those before an estimate, and the planned ones.
+/// Returns the positions at which the relays measure: those before the first estimate, and the planned ones.
 fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     let relays = plan.places.len() as f64;
     // Hops of equal length. For one or two relays also: the first hop half as long, and the last hop half as long.

@@ -27,12 +27,12 @@
 
 use uav_relay_scenario::scene::Scene;
 
-/// Best position of the only relay, for data in both directions.
+/// Best position of a single relay, for data in both directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Best {
     /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
-    /// Reason for the position: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
+    /// Reason for the position: 1 if above Tx, 2 if above Rx, 3 if two SIRs are equal, 4 if one SIR is maximal.
     pub case: u8,
     /// Explanation, for the user, of why the relay goes to its position.
     pub words: String,

@@ -45,9 +45,9 @@ pub struct HypotheticalReport {
     /// 0 if the plan has these positions. With fitted slots it is the loss of data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// Gain of SIR of the plan, relative to the positions for the hypothetical interferer.
+    /// SIR of the plan divided by the SIR at the positions for the hypothetical interferer, minus 1.
     ///
-    /// With fitted slots it is the gain of data rate.
+    /// With fitted slots it is the same for the data rates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
     /// True if the data rate decides which positions are better, because the time slots are fitted.
@@ -55,7 +55,7 @@ pub struct HypotheticalReport {
     by_rate: bool,
 }
 
-/// Data rates of a planned chain, and of other numbers of relays.
+/// Data rates of a planned chain, and of chains with different numbers of relays.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
     /// Data rate of the chain, bit/s; absent without a plan.
@@ -70,7 +70,8 @@ pub struct RateReport {
     pub hop_rate_bps: Option<Rate>,
     /// Number of time slots that the hops share.
     ///
-    /// On one frequency it is one per hop and direction. With a frequency for each hop it is one per direction.
+    /// On one frequency, each hop has a slot for each direction of data. With a frequency for each hop, all hops share
+    /// one slot for each direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
     /// Time slot of each hop and direction; empty unless `link.access` is `fitted`.
@@ -86,7 +87,7 @@ pub struct RateReport {
     /// Number of relays with the largest data rate, and that rate.
     #[serde(flatten)]
     pub best: BestRate,
-    /// Data rate for each number of relays tried; empty unless the user wants the list.
+    /// Data rate for each number of relays tried; empty unless the user requests the list.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rates: Vec<RateOf>,
     /// Number of relays in the plan; 0 without a plan.
@@ -101,7 +102,7 @@ pub struct RateReport {
 }
 
 impl RateReport {
-    /// Creates the report of the rates of `plan`. `best` is the largest rate, and `rates` are those to list.
+    /// Creates the report of the rates of `plan`. `best` is the largest rate, and `rates` are the rates to list.
     ///
     /// Without a plan the report has only `best` and `rates`.
     pub fn new(
@@ -256,7 +257,7 @@ pub struct WayBack {
     /// SIRs toward Tx are first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_direction: Option<&'static str>,
-    /// Receiver of the worst hop in the direction from Rx to Tx: 0 for Tx, otherwise the relay's index.
+    /// Node that receives the worst hop in the direction from Rx to Tx: 0 for Tx, otherwise a relay's index.
     #[serde(skip)]
     hop: usize,
     #[serde(skip)]
@@ -383,10 +384,10 @@ pub struct PlanReport {
     /// Terrain below the chain; absent without elevation files.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub terrain: Option<TerrainReport>,
-    /// Gain of positions chosen for the terrain; absent for other positions.
+    /// Comparison with positions that ignore the terrain; absent if the plan ignores it, too.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub over_terrain: Option<OverTerrain>,
-    /// Flight over the terrain, and the chain after each relay's loss; absent without elevation files.
+    /// Flight over the terrain, and the chain after the loss of each relay; absent without elevation files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flight: Option<Flight>,
     /// Reason why the flight over the terrain was not simulated; absent if it was.
@@ -395,7 +396,7 @@ pub struct PlanReport {
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
-    /// Location of the interferer in its area by relays; absent without `[listen]`.
+    /// Results of how well relays locate the interferer in its area; absent without `[listen]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub locating: Option<Locating>,
     /// True if relays may have a lateral position. The table then has a column for y.

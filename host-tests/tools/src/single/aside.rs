@@ -224,7 +224,7 @@ fn holds(band: Band, value: f32) -> bool {
     (band.least_m..=band.most_m).contains(&value)
 }
 
-/// Returns the optimal position of a single relay at `altitude_m`, without limits of x and y.
+/// Returns the optimal position of a single relay at `altitude_m`, if x and y are not limited.
 fn without_limits(
     mission: &Mission,
     interferer: &Interferer,
@@ -293,7 +293,7 @@ impl Plane {
 
     /// Returns the factor t of the position -t (X, Y) with the first hop's largest SIR.
     ///
-    /// The interferer is at (X, Y), and Tx at (0, 0). As seen from Tx, the position is opposite the interferer. `q` is
+    /// The interferer is at (X, Y), and Tx at (0, 0). The position is on the side of Tx opposite the interferer. `q` is
     /// X^2 + Y^2.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
@@ -311,7 +311,7 @@ impl Plane {
         bisected(0.0, t, HALVINGS, rises).0
     }
 
-    /// Returns the point on a circle about Rx with the first hop's largest SIR, with noise: (x, y), m.
+    /// Returns the point (x, y), m, on a circle about Rx with the first hop's largest SIR in noise.
     ///
     /// `s` is the radius of the circle, m.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
@@ -340,7 +340,7 @@ impl Plane {
         self.g / (squared(s) + self.h2)
     }
 
-    /// Returns the point on the circle of radius `s` about Rx with the first hop's largest SIR.
+    /// Returns the point on the circle of radius `s` about Rx at which the first hop's SIR is largest.
     fn loudest(&self, s: f64) -> (f64, f64) {
         if self.noise > 0.0 {
             return self.loudest_in_noise(s);

@@ -40,7 +40,7 @@ impl Real for f64 {}
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// `holds` should be true at `low` and false at `high`. It changes between the returned ends.
+/// `holds` should return true for `low` and false for `high`. Its value changes between the returned ends.
 pub(super) fn bisected<T: Real>(
     low: T,
     high: T,

@@ -236,7 +236,7 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
 impl Chain {
     /// Returns the position of the drone of relay `index` (from 0), m; `None` if no drones are simulated.
     ///
-    /// It is the position that the drone estimates if the drone has no autopilot, otherwise the true position.
+    /// If the drone has no autopilot, it is the drone's own position estimate, otherwise the true position.
     pub(super) fn drone(&self, index: usize) -> Option<Point> {
         let flight = self.flight.as_ref();
         flight
