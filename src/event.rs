@@ -36,8 +36,8 @@ pub enum Event {
         /// Index of the lost neighbour in the chain, 1 to N.
         node: u16,
     },
-    /// A lost neighbour is received again, or another node has replaced it. In the second case `node` differs from
-    /// the node that was reported lost.
+    /// A lost neighbour is received again, or a new neighbour has replaced it. In the second case `node` is not the
+    /// node that was reported lost.
     NeighbourBack {
         /// Side of this relay, toward Tx or toward Rx, on which the neighbour is.
         side: Side,
@@ -197,7 +197,7 @@ pub(crate) enum NodeEvent {
     Epoch,
     /// Two nodes use the same index. If that is this relay's index, the side of the event has no meaning.
     Index,
-    /// The measurements of the node do not fit those of the other nodes.
+    /// The measurements of the node do not fit those of all other nodes.
     Sensor,
     #[cfg(feature = "departures")]
     MayLeaveTold,

@@ -55,12 +55,12 @@ pub enum Method {
     /// Optimise x, y and altitude jointly, within the mission's ranges. This method is for up to 100 relays, and not
     /// for a mission that gives the interference as a distribution along x.
     Joint,
-    /// Optimise x by the paper's Algorithm 1, then move one relay after the other by Algorithm 2. This method is not
-    /// for a mission that gives the interference as a distribution along x.
+    /// Optimise x by the paper's Algorithm 1, then move the relays in turn by Algorithm 2. This method is not for a
+    /// mission that gives the interference as a distribution along x.
     Adjust(Adjust),
 }
 
-/// Parameters of the paper's Algorithm 2, which moves one relay after the other to a better position.
+/// Parameters of the paper's Algorithm 2, which moves the relays in turn to better positions.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
@@ -148,8 +148,8 @@ pub struct Settings {
     pub quorum: bool,
     /// Behaviour of the relay while too few relays are reachable for a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With a guard the
-    /// firmware has to report the drone's position: `Relay::handle_position`.
+    /// Guard that keeps the drones separated while they move, and inside a geofence; `None` for no guard. With a guard
+    /// the firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
     /// Duration of the move to a new position on which the chain has agreed (feature `departures`). The setpoint moves
     /// in 32 equal steps; with 0 it moves in one step.

@@ -36,7 +36,7 @@ pub struct Report {
     pub neighbours: [Option<u16>; 2],
     /// Flags for the neighbours toward Tx and toward Rx: true if the relay does not receive the neighbour now.
     pub silent: [bool; 2],
-    /// True if the relay has received another node with its own number within three times `dead_after`.
+    /// True if the relay has received a second node with its number within three times `dead_after`.
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a position that is not the setpoint sent by the relay.
     pub refuses_setpoint: bool,

@@ -72,7 +72,7 @@ pub struct Estimate {
     /// estimate with a probability of about 95 %.
     ///
     /// This assumes that the interference has a Beta distribution. The standard error covers the limited number of
-    /// samples only: with another distribution the estimate can be wrong by more.
+    /// samples only: with a different distribution the estimate can be wrong by more.
     pub standard_error_per_w: f32,
     /// Number of accepted samples on which the estimate is based.
     pub samples: u32,

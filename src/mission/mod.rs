@@ -758,7 +758,7 @@ impl Mission {
         self.config.distance_m - after * self.step_of(least)
     }
 
-    /// Returns the step in x, m, that keeps two relays at least `least` metres apart after rounding to f32.
+    /// Returns the step in x, m, that keeps two relays at least `least`, m, from each other after rounding.
     fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
         if least > 0.0 {

@@ -188,7 +188,7 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
 }
 
 /// Returns the gap, divided by the lower target, for the byte `code`: (1 + m / 8) 2^(e - 25). m is the number in the
-/// low three bits of `code`, e the number in the other five bits.
+/// low three bits of `code`, e the number in its high five bits.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }

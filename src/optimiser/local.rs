@@ -30,8 +30,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals of x on each side of the interferer, for data in both directions. The search evaluates
-/// both hops at the ends of the intervals.
+/// Number of equal intervals of x before the interferer, and beyond it, for data in both directions. The search
+/// evaluates both hops at the ends of the intervals.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -53,7 +53,7 @@ pub enum Local {
     },
 }
 
-/// Neighbour of a relay whose position is searched. It is the other end of one of the relay's two hops.
+/// Neighbour of a relay whose position is searched: the far end of one of the relay's two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
     /// Position of the neighbour.
@@ -167,7 +167,7 @@ impl Hops {
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
-    /// For traffic in both directions, each result is the smaller of two SIRs: the forward SIR, and the backward SIR
+    /// For data in both directions, each result is the smaller of two values: the forward SIR, and the backward SIR
     /// divided by r. r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);

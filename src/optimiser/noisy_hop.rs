@@ -46,15 +46,15 @@ pub(super) const MOST_RATIO: f32 = 1e18;
 /// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
 const STEPS: u8 = 32;
 
-/// Maximum number of steps of a search by bisection, each of which at least halves the interval.
+/// Maximum number of steps of a search by bisection. Each step at least halves the interval.
 pub(super) const HALVINGS: u8 = 32;
 
 /// Number of Newton steps for the hop length at which the curvature of the margin g changes its sign. g is 0 or above
 /// where a hop with noise meets its target.
 const TURNS: u8 = 5;
 
-/// Rounding error of the margin of a hop with noise, relative to the required value. A target that is missed by at most
-/// this error counts as met.
+/// Rounding error of the margin of a hop with noise, as a fraction of the required value. A target that is missed by at
+/// most this error counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of the hop length below which the search for the maximum length ends.

@@ -521,7 +521,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
 
     /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
     ///
-    /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
+    /// Each item has the index of a relay, the reach of the previous relay of the pass, m, and the reach of this relay,
+    /// m.
     pub fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
         let mut reach = origin(self.mission);
         let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));

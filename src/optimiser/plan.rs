@@ -20,8 +20,8 @@ pub struct Agreed {
     pub commit: u8,
     /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
-    /// Target SIR that no chain at these altitudes can meet, linear. `None` with the paper's fixed step, because its
-    /// passes do not try all chains. `None` also for data in both directions.
+    /// Target SIR that no chain with the relays' altitudes can meet, linear. `None` with the paper's fixed step,
+    /// because its passes do not try all chains. `None` also for data in both directions.
     pub most: Option<f32>,
     /// Number of passes along the chain that the search took.
     pub sweeps: u32,

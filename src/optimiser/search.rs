@@ -25,7 +25,7 @@ use crate::root::sqrt;
 use crate::side::Heading;
 use crate::sir::{self, Sender};
 
-/// Schedule of the target SIRs that the leader tries, one pass along the chain after another.
+/// Schedule of the target SIRs that the leader tries in successive passes along the chain.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
@@ -101,7 +101,7 @@ impl Search {
     /// Creates a search by the leader of `mission` with the profile `leader`. The other relays can have other profiles.
     ///
     /// # Errors
-    /// [`Infeasible`] if a relay right above the receiver gives the receiver an SIR of 0, because the interferer is
+    /// [`Infeasible`] if a relay vertically above the receiver gives the receiver an SIR of 0, because the interferer is
     /// at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {
@@ -308,7 +308,7 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
 /// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target).
 ///
 /// The cubic curve passes through the four points next to the change of sign. `None` if a straight line gives a very
-/// different target: the slack then jumps, and neither target is meaningful.
+/// different target: the slack then jumps, and no interpolated target is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;

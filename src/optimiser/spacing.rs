@@ -484,9 +484,9 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 /// Returns the paper's `d_max`, m: the largest distance along x at which a relay meets `target` at Rx.
 ///
 /// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared distance),
-/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above the receiver
-/// is too weak. The result can exceed the distance from Tx to Rx. So it is a smooth function of the target, as the root
-/// search requires.
+/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if a relay vertically above the receiver
+/// is too weak, too. The result can exceed the distance from Tx to Rx. So it is a smooth function of the target, as the
+/// root search requires.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;

@@ -70,7 +70,7 @@ const CONSISTENT: f64 = 0.1;
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits of the squared difference at which an excluded relay's measurement fits the others again. The first is a
+/// Limits of the squared difference at which an excluded relay's measurement fits the others' again. The first is a
 /// multiple of the variance, the second a squared relative difference. The larger limit counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
@@ -262,7 +262,7 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay still does not fit the other relays.
+/// Returns true if the measurement of an excluded relay still does not fit those of the others.
 ///
 /// The measurement v = 1e-12 W / I at `place` is compared with e. e is the value at this place of a source fitted to
 /// `others`, the sums of the remaining relays. The difference is (v / e - e / v) / 2, which is symmetric in both.

@@ -74,9 +74,9 @@ pub enum Spread {
     /// Spacing with all hops of the same length.
     #[default]
     Even,
-    /// Spacing with the first hop, from Tx, half as long as the other hops.
+    /// Spacing with the first hop, from Tx, half as long as all other hops.
     TowardTx,
-    /// Spacing with the last hop, to Rx, half as long as the other hops.
+    /// Spacing with the last hop, to Rx, half as long as all other hops.
     TowardRx,
 }
 
@@ -100,7 +100,7 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change of the interference below which a new estimate is not adopted.
+/// Mean square relative change of the interference above which a new estimate is adopted.
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
@@ -149,7 +149,7 @@ const GUESSED: f64 = 16.0;
 pub(crate) struct Knowledge {
     /// Information in the measurements: number of positions divided by the error variance of one position.
     information: f64,
-    /// Expected mean square relative error of the current estimate.
+    /// Expected mean square of the relative error of the current estimate's interference.
     chance: f64,
     /// Number of estimates adopted for the same interferer, up to [`REFINED`].
     refined: u8,

@@ -244,7 +244,7 @@ impl Fit {
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference in interference between the fit and another source. It is the mean
+    /// Returns the mean square relative difference in interference between the fit and a given source. It is the mean
     /// over the measured positions. The source is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)

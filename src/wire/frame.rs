@@ -17,8 +17,8 @@ const CHECK: usize = 4;
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
-/// Maximum length of a frame on the wire, bytes. COBS adds one byte below 254 bytes, and the delimiter is another
-/// byte.
+/// Maximum length of a frame on the wire, bytes. COBS adds one byte to a frame of fewer than 254 bytes, and the
+/// delimiter adds one.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
 /// Header flag: an authentication tag follows the body.

@@ -119,7 +119,7 @@ fn without_faults_one_sweep_is_enough() {
     }
 }
 
-/// Largest accepted growth of a median time or count from 25 to N relays, relative to N log N.
+/// Largest accepted growth of a median time or count from 25 to N relays, divided by that of N log N.
 const MOST: f64 = 1.5;
 
 /// Checks that the time and the messages until an agreement of N relays grow like N log N on bad links.

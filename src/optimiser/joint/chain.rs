@@ -163,8 +163,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 }
 
-/// Gains of all hops of a chain, in both directions. The SIR of a hop is its gain, times the inverse interference at
-/// the receiver, divided by the squared length of the hop. For a hop to Rx or to Tx, the gain includes the inverse
+/// Gains of all hops of a chain, toward Rx and toward Tx. The SIR of a hop is its gain, times the inverse interference
+/// at the receiver, divided by the squared length of the hop. For a hop to Rx or to Tx, the gain includes the inverse
 /// interference.
 ///
 /// Lengths are in units of the distance D from Tx to Rx. The gains can also be stored as logarithms.

@@ -29,12 +29,12 @@ pub(super) enum Start {
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
-    /// altitudes of the other relays are interpolated between the fixed altitudes.
+    /// altitudes of all other relays are interpolated between the fixed altitudes.
     ///
     /// If `level` is true, the altitude stays constant from the outermost fixed relay to Tx or Rx. If it is false,
     /// the altitude falls to the lowest permitted altitude at Tx and at Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation.
+    /// Initial chain in a zigzag, for relays that do not fit between Tx and Rx in one line.
     ///
     /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position one
     /// separation beside it. The corner is at the highest altitude, on the side of the line Tx to Rx opposite the

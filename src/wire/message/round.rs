@@ -48,8 +48,8 @@ pub struct Sweep {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the other targets. A negative
-    /// sign marks a plain pass, in which every relay takes the farthest x that meets the target.
+    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the rest. A negative sign marks
+    /// a plain pass, in which every relay takes the farthest x that meets the target.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -257,7 +257,7 @@ impl Roster {
     }
 }
 
-/// Token message of Algorithm 2, in which relays improve their positions one after the other.
+/// Token message of Algorithm 2, in which the relays improve their positions in turn.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -498,7 +498,7 @@ impl EstimateBody {
     }
 }
 
-/// Measurement sums on the wire, as two arrays of nine numbers that are encoded one after the other.
+/// Measurement sums on the wire: two successive arrays of nine numbers.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {

@@ -427,9 +427,9 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks when the node with the smaller claim can replace another node of the same number. It is accepted once the
-/// node with the larger claim is silent. Recorded frames of the node with the larger claim are then rejected, until
-/// that node sends new frames.
+/// Checks when the node with the smaller claim can replace a node of the same number. It is accepted once the node with
+/// the larger claim is silent. Recorded frames of the node with the larger claim are then rejected, until that node
+/// sends new frames.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

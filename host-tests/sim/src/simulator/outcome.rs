@@ -237,7 +237,7 @@ pub struct Outcome {
     ///
     /// Targets up to 1.5 s after the change of the state do not count. Nonzero is a bug.
     pub stray_targets: u64,
-    /// Final position of each drone with an autopilot, and true if the relay controls it.
+    /// Final position of each drone with an autopilot, and a flag: true if the relay controls the drone.
     ///
     /// The position is relative to the line of the relay's mission, which an upload may move.
     pub fleet: Vec<(Point, bool)>,

@@ -130,7 +130,7 @@ const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
 const SIZE: f64 = 10.0;
 
-/// Largest lateral offset of an interferer in the view from above, relative to the relays' limit.
+/// Largest lateral offset of an interferer in the view from above, as a multiple of the relays' limit.
 ///
 /// An interferer farther away is an arrow at the edge.
 const FARTHEST: f64 = 2.0;

@@ -41,8 +41,8 @@ fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
 
 /// Returns the points of the figure: pairs of an interferer's offset and a common altitude, m.
 ///
-/// Altitudes are 5 m apart. For the interferer's offset [`PAPERS_OFFSET_M`], they are 0.5 m apart near the paper's best
-/// altitude.
+/// Altitudes are in steps of 5 m. For the interferer's offset [`PAPERS_OFFSET_M`], they are in steps of 0.5 m near the
+/// paper's best altitude.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {
@@ -81,8 +81,8 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 
 /// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// The interferer is at (500, `y_m`) m. The search tries altitudes 5 m apart, and then refines the best of them to 0.1
-/// m. The refined altitude is used only if its SIR is higher by more than twice the tolerance of a chain's SIR.
+/// The interferer is at (500, `y_m`) m. The search tries altitudes in steps of 5 m, and then refines the best of them
+/// to 0.1 m. The refined altitude is used only if its SIR is higher by more than twice the tolerance of a chain's SIR.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;

@@ -80,7 +80,7 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
 
 /// Returns the relay's best positions at the lowest altitude.
 ///
-/// There is one for each interferer's offset and each limit of the relay's |y|. The limits are `step_m` apart.
+/// There is one for each interferer's offset and each limit of the relay's |y|. The limits are in steps of `step_m`.
 fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
@@ -100,7 +100,7 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the relay's best SIRs for interferers at several y, which are `step_m` apart.
+/// Returns the relay's best SIRs for interferers at several y, in steps of `step_m`.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()

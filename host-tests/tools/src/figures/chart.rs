@@ -16,7 +16,7 @@ pub struct Chart {
 /// Panel of a chart: a pair of axes and the curves drawn in it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Panel {
-    /// Heading that distinguishes the panel from the others; empty for a single panel.
+    /// Heading that distinguishes the panels of a chart; empty for a single panel.
     pub heading: String,
     /// Horizontal axis of the panel.
     pub x: Axis,

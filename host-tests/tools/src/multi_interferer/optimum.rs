@@ -395,7 +395,7 @@ pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Longest hop to each sampled position, apart from a factor: (I + N)^(-1/2), in W^(-1/2).
+    /// Longest hop to each sampled position, divided by a factor: (I + N)^(-1/2), in W^(-1/2).
     ///
     /// I and N are the powers of interference and noise at the receiver, W. The factor is a [`Stride`].
     quiet: Vec<f64>,

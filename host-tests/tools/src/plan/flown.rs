@@ -133,7 +133,7 @@ pub(super) fn alone(
 
 /// Largest difference of a coordinate between the file's plan and the recomputed plan, m.
 ///
-/// They differ if the file's plan was made on another machine, which rounds differently.
+/// The two differ slightly if the file's plan was made on a machine that rounds differently.
 const SAME_M: f64 = 0.1;
 /// Largest difference of the SIR between the file's plan and the recomputed plan, dB.
 const SAME_DB: f64 = 0.01;

@@ -383,7 +383,7 @@ fn fewest_of<T>(
 /// Largest number of relays that the planner tries for a target.
 const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
-/// Mission, the relays' own profiles (power, altitude), and the indices of relays with fixed altitudes.
+/// Mission, the relays' profiles (power, altitude), and the indices of relays with fixed altitudes.
 struct ProfiledMission {
     mission: Mission,
     own: Vec<(u16, Profile)>,

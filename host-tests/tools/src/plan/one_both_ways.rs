@@ -52,7 +52,7 @@ const EQUAL: f64 = 1e-6;
 /// Coefficients of a polynomial, from the constant term to the highest power.
 type Polynomial = Vec<f64>;
 
-/// Returns the best position of a single relay for both directions; `None` if every SIR is 0.
+/// Returns the best position of a single relay for data in both directions; `None` if every SIR is 0.
 ///
 /// The SIR toward Tx needs to be only `reverse` (above 0) times the SIR toward Rx.
 pub fn best(scene: &Scene, reverse: f64) -> Option<Best> {

@@ -359,7 +359,8 @@ impl<'a> Search<'a> {
 
     /// Returns the SIR of the hop to node `node` in free space, linear.
     ///
-    /// For both directions it is the smaller SIR of the two, with the SIR toward Tx divided by `reverse`.
+    /// For data in both directions it is the smaller of two values: the SIR toward Rx, and the SIR toward Tx divided by
+    /// `reverse`.
     fn free_sir(&self, node: usize, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let place = |at: Candidate| (at.x_m, at.h_m);
         let relays = &self.scene.relays;

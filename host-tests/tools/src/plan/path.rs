@@ -214,8 +214,8 @@ impl<'a> Times<'a> {
 
     /// Returns the time of a chain for one bit, s Hz, with the relays at `x`, m.
     ///
-    /// It is infinite if the chain carries nothing, or if relays are closer than the minimum separation, apart from
-    /// rounding.
+    /// It is infinite if the chain carries nothing, or if relays are closer than the minimum separation less a rounding
+    /// error.
     pub fn total(&self, x: &[f64]) -> f64 {
         self.along(x, false)
     }

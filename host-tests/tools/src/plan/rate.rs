@@ -37,7 +37,7 @@ const LEAST_LISTED: u16 = 10;
 pub enum Rate {
     /// Rate from Tx to Rx, bit/s, of a chain for this direction only.
     There(f64),
-    /// Rates to Rx and to Tx, bit/s, of a chain for both directions.
+    /// Rates to Rx and to Tx, bit/s, of a chain for data in both directions.
     Both([f64; 2]),
 }
 
@@ -116,7 +116,8 @@ pub struct BestRate {
     pub best_uavs: u16,
     /// Largest data rate, bit/s.
     ///
-    /// For both directions it is the smaller of two rates: to Rx, and to Tx divided by the required fraction.
+    /// For data in both directions it is the smaller of two values: the rate to Rx, and the rate to Tx divided by the
+    /// required fraction.
     pub best_rate_bps: f64,
     /// Largest number of relays tried. All numbers from 1 on were tried.
     pub tried_uavs: u16,
@@ -139,8 +140,8 @@ impl Rates {
     /// Plans 1, 2, 3 and more relays, and computes their data rates over `radio`.
     ///
     /// It ends when a larger number is proven to carry no more, or at a limit of some seconds. `target_bps` is the
-    /// wanted rate to Rx. For both directions, the rate to Tx must be at least `target_bps` times the scenario's
-    /// `reverse`.
+    /// wanted rate to Rx. For data in both directions, the rate to Tx must be at least `target_bps` times the
+    /// scenario's `reverse`.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
@@ -295,8 +296,8 @@ impl MostRate {
 
     /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s.
     ///
-    /// For both directions the data rate is the smaller of two rates: to Rx, and to Tx divided by the required
-    /// fraction.
+    /// For data in both directions, the rate of a chain is the smaller of two values: the rate to Rx, and the rate to
+    /// Tx divided by the required fraction.
     fn of(&self, radio: &Radio, relays: u16) -> f64 {
         let relays = f64::from(relays);
         match radio.link.access {

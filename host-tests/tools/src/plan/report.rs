@@ -60,12 +60,12 @@ pub struct HypotheticalReport {
 pub struct RateReport {
     /// Data rate of the chain, bit/s; absent without a plan.
     ///
-    /// A plan for both directions also has the rate toward Tx.
+    /// A plan for data in both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<Rate>,
     /// Data rate of the worst hop during its time slot, bit/s.
     ///
-    /// A plan for both directions also has the rate toward Tx.
+    /// A plan for data in both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<Rate>,
     /// Number of time slots that the hops share.
@@ -235,7 +235,7 @@ const fn relays_carry(number: u16) -> (&'static str, &'static str) {
 
 /// SIRs of the hops in the direction from Rx to Tx.
 ///
-/// `reverse`, `worst_both` and `worst_direction` are present if the relays are placed for both directions.
+/// `reverse`, `worst_both` and `worst_direction` are present if the relays are placed for data in both directions.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WayBack {
     /// SIR of the hop from Rx to the last relay, linear.
@@ -247,7 +247,7 @@ pub struct WayBack {
     /// Required SIR toward Tx as a fraction of that toward Rx; absent in a plan for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
-    /// SIR of the worst hop of both directions, linear; SIRs toward Tx are first divided by `reverse`.
+    /// SIR of the worst hop toward Rx or Tx, linear; SIRs toward Tx are first divided by `reverse`.
     ///
     /// Absent in a plan for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -315,14 +315,14 @@ pub struct PlanReport {
     pub best_sir_db: Option<f64>,
     /// SIR of the plan's worst hop, linear.
     ///
-    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
-    /// fraction of the SIR toward Rx.
+    /// In a plan for data in both directions, hops toward Rx and hops toward Tx count. An SIR toward Tx is first
+    /// divided by its required fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the plan's worst hop, dB.
     ///
-    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
-    /// fraction of the SIR toward Rx.
+    /// In a plan for data in both directions, hops toward Rx and hops toward Tx count. An SIR toward Tx is first
+    /// divided by its required fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
     /// SIRs in the direction from Rx to Tx; absent if the interference at Tx is unknown.
@@ -353,7 +353,7 @@ pub struct PlanReport {
     pub proven: Option<bool>,
     /// Number of the theorem that placed the only relay, 1 to 3 as in the paper.
     ///
-    /// 4 is one relay with a lateral offset, and 5 one relay for both directions. Both are not in the paper.
+    /// 4 is one relay with a lateral offset, and 5 one relay for data in both directions. Neither is in the paper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
     /// Case number of the theorem in the paper; 0 for a case that the paper omits.

@@ -28,7 +28,7 @@ use super::path::{Hop, Point, Times};
 /// Number of equal cells between Tx and Rx.
 const CELLS: u16 = 800;
 
-/// Smallest relative gain in a chain's time for one bit that the search looks for.
+/// Smallest relative decrease of a chain's time for one bit that the search looks for.
 const GAIN: f64 = 2e-5;
 
 /// Largest relative difference of two chains' times for one bit that count as equal.

@@ -114,8 +114,8 @@ pub enum AsideCase {
 impl AsideCase {
     /// Number of the case, 1 to 10.
     ///
-    /// Cases 1 to 3 are optima without limits; 4 to 6 are optima on edges along x, y and h. In cases 7 and 8 the
-    /// interferer is at Tx or Rx. Cases 9 and 10 occur only with noise.
+    /// Cases 1 to 3 are optima that the limits of x, y and h do not affect; 4 to 6 are optima on edges along x, y and
+    /// h. In cases 7 and 8 the interferer is at Tx or Rx. Cases 9 and 10 occur only with noise.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -133,8 +133,8 @@ impl AsideCase {
 /// Returns the optimal position of a relay with `profile`, and its case; `None` in a field.
 ///
 /// x is between Tx and Rx, and y in the allowed lateral range. The relay has the altitude of `profile`. Work: 48
-/// bisection steps in f64; with noise 48 further steps for each of them. If the optimum without limits is not allowed,
-/// some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
+/// bisection steps in f64; with noise 48 further steps for each of them. If the optimum is outside of the allowed
+/// ranges, some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
@@ -142,7 +142,7 @@ pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)
 /// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field.
 ///
 /// x is between Tx and Rx; y and altitude are in their allowed ranges. Work: 48 bisection steps in f64; with noise 48
-/// further steps for each of them. If the optimum without limits is not allowed, some 800 evaluations of both hops;
+/// further steps for each of them. If the optimum is outside of the allowed ranges, some 800 evaluations of both hops;
 /// with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)

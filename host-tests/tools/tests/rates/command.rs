@@ -201,7 +201,7 @@ fn what_has_no_way_back_is_refused_by_name() {
     assert!(line.contains("link.reverse"), "{line}");
 }
 
-/// Checks plans for both directions, with several interferers and with a field of interference.
+/// Checks plans for data in both directions, with several interferers and with an interference field.
 #[test]
 fn several_interferers_and_fields_are_planned_both_ways() {
     let several = scenario(

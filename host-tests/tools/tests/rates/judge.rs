@@ -129,7 +129,8 @@ impl Chain {
 
     /// Returns the data rate of a chain with relays at `x`, m, in bit/s/Hz.
     ///
-    /// For both directions it is the smaller of two rates: to Rx, and to Tx divided by `reverse`.
+    /// For data in both directions it is the smaller of two values: the rate to Rx, and the rate to Tx divided by
+    /// `reverse`.
     pub(crate) fn rate(&self, x: &[f64]) -> f64 {
         self.rate_of(self.total(x), x.len())
     }

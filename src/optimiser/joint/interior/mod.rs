@@ -48,7 +48,7 @@ const CLOSE_MU: f32 = 3e-3;
 /// concave around the optimum.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight falls once a Newton step gains little.
+/// Factor on the barrier weight, applied once a Newton step raises the merit only a little.
 const LESS: f32 = 0.3;
 
 /// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. It applies after
@@ -62,7 +62,7 @@ const ITERATIONS: u8 = 60;
 
 /// Maximum step of a coordinate toward its limit, as a fraction of the distance to that limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a Newton step is shortened if it lowers the merit (the maximised function).
+/// Factor on the length of a Newton step that lowers the merit (the maximised function).
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
@@ -73,7 +73,7 @@ const APART: f32 = 5.0;
 const STEPS: u8 = 4;
 /// Index, from 0, of the last Newton step for the target.
 const TARGETS: u8 = 12;
-/// Relative error at which the Newton steps for the target end.
+/// Relative error at which the Newton iteration for the target T ends.
 const EXACT: f32 = 5e-4;
 
 /// Number of relays in a segment, the part of the chain that one call handles.
@@ -178,7 +178,7 @@ enum Work {
     Substitute(u16, bool),
 }
 
-/// Interior-point method for the worst SIR of both directions: all positions and the Newton step.
+/// Interior-point method for the worst SIR of all hops toward Rx and Tx: positions and Newton step.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,

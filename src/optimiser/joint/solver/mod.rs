@@ -217,14 +217,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of solvers for both directions: 1 with the features `altitude` and `reverse`, else 0.
+/// Number of solvers for data in both directions: 1 with the features `altitude` and `reverse`, else 0.
 const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
 /// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is as long as its hop
 /// needs.
 const FITTED: usize = ALTITUDE as usize;
 
-/// Joint solver of a chain: the solver for one direction, for both directions, or for fitted slots.
+/// Joint solver of a chain: the solver for data in one direction, in both, or for fitted slots.
 ///
 /// A mission needs only one of the three, so they share their memory.
 #[cfg_attr(
@@ -419,8 +419,8 @@ mod tests {
     }
 
     /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is the
-    /// target, the others are each relay's lateral offset and altitude. If `once_more` is true, the best chain is
-    /// computed again instead of stored.
+    /// target; then follow each relay's lateral offset and altitude. If `once_more` is true, the best chain is computed
+    /// again instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],

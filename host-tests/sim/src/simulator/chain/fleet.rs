@@ -20,7 +20,7 @@ const LOOKS: Duration = Duration::from_millis(5_000);
 
 /// Distance to keep from moving drones during a hand-over, m, in addition to the required separation.
 ///
-/// A pilot does not hand a drone over to its relay while another moving drone is nearer.
+/// A pilot does not hand a drone over to its relay while a moving drone is nearer to it.
 const TRAFFIC_M: f64 = 30.0;
 
 /// Time until a pilot lands a drone, after its relay was switched off or after a permanent takeover.
