@@ -94,9 +94,9 @@ pub enum Event {
     /// The lease has expired. The relay keeps its setpoint and requests a new view, because the members no longer have
     /// to keep to the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
-    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land the
-    /// drones of this part.
+    /// A new view was refused because too few relays are reachable for a quorum. The relays of this part of the chain
+    /// hold their positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or
+    /// land the drones of this part.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,

@@ -84,7 +84,7 @@ impl Default for Adjust {
     }
 }
 
-/// Settings of a relay that measures the interference itself. They are for a mission that gives the interference as a
+/// Settings of a relay that measures the interference itself. Only for a mission that gives the interference as a
 /// distribution along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -121,8 +121,8 @@ pub struct Settings {
     /// Measurement of the interference by this relay; `None` for no measurement. The measured interference replaces
     /// the distribution along x that the mission gives. Use `None` if the mission gives no such distribution.
     pub measure: Option<Measure>,
-    /// Estimation of an unknown interferer from measurements; `None` for no estimation. It must be `None` if the
-    /// mission gives the interference as a distribution along x. Set it on all relays of a chain, or on none.
+    /// Estimation of an unknown interferer from measurements; `None` for no estimation. Use `None` if the mission gives
+    /// the interference as a distribution along x. Set it on all relays of a chain, or on none.
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
@@ -137,8 +137,8 @@ pub struct Settings {
     /// Maximum time from `poll_transmit` at one relay to `poll_transmit` at the next relay; above 0. The time is for
     /// a message of 100 bytes (a sweep), and includes the computation. For longer messages it is scaled up.
     pub hop_time: Duration,
-    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. It sends 16 requests until
-    /// `dead_after`, and more on a channel that loses frames.
+    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. This relay sends 16 requests
+    /// until `dead_after`, and more on a channel that loses frames.
     pub probe_after: Duration,
     /// Minimum silence after which a neighbour counts as lost, and minimum duration of a lease. Above `probe_after`.
     pub dead_after: Duration,

@@ -603,7 +603,7 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to N), or in an
+    /// Returns the order in which the relays compute their positions. The order is toward Rx (relay 1 to N), or in an
     /// interference field toward Tx (relay N to 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
@@ -613,8 +613,8 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, which computes its position first. It is 1, or N for a mission with an
-    /// interference field.
+    /// Returns the index of the leader, which computes its position first. The leader is relay 1, or relay N in a
+    /// mission with an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -825,8 +825,8 @@ impl Mission {
     }
 }
 
-/// Substitute for an interferer at an unknown position. It is so far away that all receivers have the same
-/// interference, to 1e-7.
+/// Substitute for an interferer at an unknown position. This substitute is so far away that the interference at all
+/// receivers is equal to within 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,

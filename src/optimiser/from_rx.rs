@@ -73,8 +73,8 @@ impl FromRx {
 
     /// Returns the length margin of the hop from Rx to the last relay at `x_m`, m: (SIR / required SIR - 1) D.
     ///
-    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. It is a continuous function
-    /// of `target`.
+    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. The margin is a continuous
+    /// function of `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;

@@ -19,13 +19,14 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Eighth of the 16 targets, linear SIR: the lower of the two middle targets. In a list of one target, this target.
+    /// Eighth of the 16 targets, linear SIR: the lower of the two middle targets. If the list has one target, that
+    /// target.
     anchor: f32,
     /// Code of the relative gap between the two middle targets: their difference divided by the lower one. The code is
     /// a float of 5 exponent and 3 mantissa bits. With code 0, `anchor` is the only target.
     gap: u8,
-    /// Code of the growth of the gaps from the middle of the list to its ends. Each gap is 1 + `growth` / 16 times its
-    /// neighbour toward the middle.
+    /// Code of the growth of the gaps from the middle of the list to its ends. Each gap is 1 + `growth` / 16 times the
+    /// next gap toward the middle.
     growth: u8,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stop before
     /// that x to help the next relay on the pass.

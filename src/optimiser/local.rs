@@ -85,8 +85,8 @@ pub struct Hops {
     noise: f32,
 }
 
-/// Gains of both hops for data from Rx to Tx, divided by r. r is the required ratio of backward to forward SIR. They
-/// are infinite for a mission without such data.
+/// Gains of both hops for data from Rx to Tx, divided by r. r is the required ratio of backward to forward SIR. The
+/// gains are infinite for a mission without data from Rx to Tx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
     /// SIR with which the next node toward Tx receives this relay, times the squared hop length, m^2.

@@ -60,7 +60,8 @@ const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 /// Relative change of the hop length below which the search for the maximum length ends.
 const CLOSE: f32 = 5e-7;
 
-/// Hop with receiver noise that has to meet one target SIR. Its methods compute the lengths along x at which it does.
+/// Hop with receiver noise that has to meet one target SIR. Its methods compute the lengths along x at which the target
+/// is met.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
     /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times the inverse interference, divided by
@@ -97,8 +98,8 @@ impl NoisyHop {
 
     /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error.
     ///
-    /// g, m^2, is at least 0 if the hop meets its target SIR. `d` is along x, m. It must be so short that the noise
-    /// alone does not make the hop miss the target.
+    /// g, m^2, is at least 0 if the hop meets its target SIR. `d` is along x, m, and so short that the noise alone does
+    /// not make the hop miss the target.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;

@@ -64,8 +64,8 @@ const ROUNDING: f32 = 4e-6;
 /// Maximum number of f32 steps that shorten a computed hop until it meets its target.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in an interference field, with a receiver at a known position. It gives the sender's x for each
-/// target.
+/// Hop toward Rx in an interference field, with a receiver at a known position. Its methods compute the sender's x for
+/// a target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
     /// Gain A of the hop, m^2. The hop's SIR is A times `quiet`, divided by the squared length.
@@ -80,7 +80,7 @@ pub struct Retreat<'a> {
     end_m: f32,
     to_rx: bool,
     /// Backward hop from this hop's receiver to this hop's sender: its gain, and the interference at the sender. `None`
-    /// for data in one direction. The gain is for the field's largest Upsilon = E[1/I]. It is divided by r, the
+    /// for data in one direction. The gain is for the field's largest Upsilon = E[1/I]. This gain is divided by r, the
     /// required ratio of backward to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }

@@ -76,7 +76,8 @@ const MOST_SWEEPS: u32 = 48;
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
+    /// Upper bound of the chain's SIR, linear. This is the maximum SIR of the hop between the leader and the nearer
+    /// end, Tx or Rx.
     ceiling: f32,
     /// First target of the fixed-step schedule (gamma_0 of the paper), or upper bound of the bracketed one.
     start: f32,
@@ -87,8 +88,8 @@ pub struct Search {
     ladder: Ladder,
     tried: u32,
     /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule has
-    /// only plain passes. They are also used after a relay has refused a target, because it cannot take the x that the
-    /// next relay requires.
+    /// only plain passes. Plain passes are also used after a relay has refused a target. A relay refuses a target if it
+    /// cannot take the x that the next relay requires.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if no such target is known.
     most: Option<f32>,
@@ -101,7 +102,7 @@ impl Search {
     /// Creates a search by the leader of `mission` with the profile `leader`. The other relays can have other profiles.
     ///
     /// # Errors
-    /// [`Infeasible`] if a relay vertically above the receiver gives the receiver an SIR of 0, because the interferer is
+    /// [`Infeasible`] if a relay above the receiver gives the receiver an SIR of 0, because the interferer is
     /// at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {

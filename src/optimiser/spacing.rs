@@ -68,7 +68,8 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared for many targets. Its maximum length for a target takes three divisions and a square root.
+/// Hop toward Rx, prepared for many targets. To compute its maximum length for a target takes three divisions and a
+/// square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -92,7 +93,7 @@ pub struct Hop {
     from_tx: bool,
     /// Largest permitted x of this hop's receiver, m; Tx is at x = 0.
     end_m: f32,
-    /// Maximum x of the receiver, and maximum x of the sender, m. They leave the relays nearer to Rx room for their
+    /// Maximum x of the receiver, and maximum x of the sender, m. Up to these x, the relays nearer to Rx fit with their
     /// minimum separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a mission without data from Rx to Tx.

@@ -288,8 +288,8 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing should receive several times its noise `noise_w`, W. Its receiver is
-/// then faulty.
+/// Returns true if a relay that measures nothing should receive several times its noise `noise_w`, W. The receiver of
+/// this relay is then faulty.
 ///
 /// The expected power follows from the repeated measurements of the remaining relays, whose sums are `others`. `there`
 /// has the terms of the relay's position.

@@ -114,8 +114,8 @@ const BEYOND_CHANCE: f64 = 8.0;
 /// new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's mean square change to that by chance, which shows a new interferer. It applies to a
-/// stationary source, after [`REFINED`] refinements.
+/// Minimum ratio of an estimate's mean square change to that by chance, which shows a new interferer. This ratio
+/// applies to a stationary source, after [`REFINED`] refinements.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -140,8 +140,8 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 /// the interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error of measurements above which they contradict the mission's interference. It is a multiple of the
-/// variance that the operator expects. The relays then treat the interference as unknown.
+/// Mean square error of measurements above which they contradict the mission's interference. The unit is the variance
+/// that the operator expects. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.

@@ -118,8 +118,8 @@ impl Factor {
         last
     }
 
-    /// Returns the variance of the fitted value at a position, for measurements of variance 1. It is r^T G^-1 r, with
-    /// the position's `terms` r and the fit's matrix G.
+    /// Returns the variance of the fitted value at a position, for measurements of variance 1. The variance is r^T G^-1
+    /// r, with the position's `terms` r and the fit's matrix G.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -244,8 +244,8 @@ impl Fit {
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference in interference between the fit and a given source. It is the mean
-    /// over the measured positions. The source is given by its four coefficients ([`coefficients`]).
+    /// Returns the mean square relative difference in interference between the fit and a given source. The mean is over
+    /// the measured positions. The source is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)
     }
@@ -362,8 +362,8 @@ const FINE: i8 = 2;
 /// grid.
 const FINER: u8 = 5;
 
-/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. They are searched on
-/// grids. Positions are in units of half the distance from Tx to Rx.
+/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. The search tries the points
+/// of grids. Positions are in units of half the distance from Tx to Rx.
 ///
 /// The search covers Y' above `side`, the mean Y' of the measured positions, if `sign` is 1, and Y' below it if `sign`
 /// is -1. It tries 414 positions, in some 16 000 instructions on a Cortex-M4F.

@@ -71,8 +71,8 @@ pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Four terms of a position. The inverse interference of a source is a linear combination of them. They are 1, u, u^2 -
-/// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
+/// Four terms of a position. The inverse interference of a source is a linear combination of them. The terms are 1, u,
+/// u^2 - 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
 /// Returns the four terms of the position `at`. A source's inverse interference there is a linear combination of
@@ -100,17 +100,17 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Converts a source's power to its strength k = eta D^2 [`UNIT_W`] / (4 P), and a strength to a power. P is `power_w`,
-/// in W, eta the mission's path-loss factor to the ground, and D its distance from Tx to Rx.
+/// Converts a source's power to its strength k = eta D^2 [`UNIT_W`] / (4 P). The same formula converts a strength to a
+/// power. P is `power_w`, in W, eta the mission's path-loss factor to the ground, and D its distance from Tx to Rx.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
     0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
-/// Returns the four coefficients of `source`, which turn a position's terms into v = 1e-12 W / I. They are k (X'^2 +
-/// Y'^2 + 1/3), -2 k X', k and -2 k Y'. X' and Y' are the position in units of half the distance from Tx to Rx, and k
-/// is the [`strength`].
+/// Returns the four coefficients of `source`, which turn a position's terms into v = 1e-12 W / I. The coefficients are
+/// k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'. X' and Y' are the position in units of half the distance from Tx to
+/// Rx, and k is the [`strength`].
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -133,8 +133,8 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Number of sums that a sensing pass collects. They are products of terms, terms times v, v squared, number of
-/// positions, number of measurements, and age.
+/// Number of sums that a sensing pass collects. The sums are over products of terms, terms times v, v squared, number
+/// of positions, number of measurements, and age.
 pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.

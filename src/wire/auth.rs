@@ -127,8 +127,8 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Replay protection for one sender: the frame counters that were accepted. It has the newest accepted frame counter,
-/// and a flag for each of the 63 counters below it.
+/// Replay protection for one sender: the frame counters that were accepted. The type stores the newest accepted frame
+/// counter, and a flag for each of the 63 counters below that one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {

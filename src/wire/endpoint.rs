@@ -30,7 +30,7 @@ pub(crate) struct Endpoint {
 }
 
 impl Endpoint {
-    /// Creates the endpoint of node `node` in the network `network`. It does not sign frames.
+    /// Creates the endpoint of node `node` in the network `network`, which does not sign frames.
     pub(crate) fn new(network: u16, node: u16) -> Self {
         Self {
             network,
@@ -89,8 +89,8 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once a signing node has used all frame counters. It must not send before it restarts with a new
-    /// epoch, because a counter must not be used twice.
+    /// Returns true once a signing node has used all frame counters. The node must not send before it restarts with a
+    /// new epoch, because a counter must not be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }

@@ -104,7 +104,7 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of the buffer `out` for a frame's body. It begins after the COBS code byte and the header.
+/// Returns the part of the buffer `out` for a frame's body. The body begins after the COBS code byte and the header.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }

@@ -94,7 +94,7 @@ fn a_hundred_agree_at_the_least_baud_with_30_percent_loss() {
 
 /// Returns the largest permitted number of claims, and echoes of claims, of a relay until `ended`.
 ///
-/// A claim shows relays if two of them use one number; its receiver sends it back as an echo.
+/// By claims, relays detect that two of them use the same number. The receiver of a claim sends it back as an echo.
 fn most_claims(ended: Instant) -> u64 {
     let ms = ended.as_micros() / 1_000;
     let first = (1..=6).filter(|k| 250 * ((1 << k) - 1) <= ms);

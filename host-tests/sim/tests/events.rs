@@ -331,8 +331,8 @@ fn a_duplicate_joins_when_the_other_one_is_gone() {
     }
 }
 
-/// Checks that only one of two relays with the same number flies in the end. They start at the same time. One of them
-/// becomes passive, which means that it gets no setpoint.
+/// Checks that only one of two relays with the same number flies in the end. The two relays start at the same time. One
+/// of them becomes passive, which means that it gets no setpoint.
 #[test]
 fn one_of_two_simultaneous_duplicates_flies() {
     for seed in 0..6 {

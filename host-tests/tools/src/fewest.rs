@@ -292,8 +292,8 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
 
 /// Returns the highest target SIR that N relays with the same `profile` meet in a field.
 ///
-/// The result is linear, and exact to one f32 step. `None` if the mission has no field, or if no target is met. It is
-/// the optimum if no minimum separation is binding: `identical_relays_in_a_field_are_optimal` in
+/// The result is linear, and exact to one f32 step. `None` if the mission has no field, or if no target is met. The
+/// result is the optimum if no minimum separation is binding: `identical_relays_in_a_field_are_optimal` in
 /// `host-tests/tests/fleet/`. In an uneven field the result of Algorithm 4 may be lower. Work: 48 chains, each with
 /// three square roots for every point of the field and relay.
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {

@@ -19,8 +19,8 @@ const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 
 /// Random experiment: relays on a line of 1 km, and interferers. In some runs the relays must locate them.
 ///
-/// The interferers have 1 to 100 W. They are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D; D is the distance from
-/// Tx to Rx.
+/// The interferers have 1 to 100 W. The interferers are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D; D is the
+/// distance from Tx to Rx.
 #[derive(Clone, Debug)]
 pub struct RandomScene {
     /// Geometry, powers and the true interferers.

@@ -512,7 +512,7 @@ fn positions_over_terrain_are_reported_with_their_gain() {
     );
 }
 
-/// Checks SIRs with interferers on hills. They are computed again from the heights of the hills.
+/// Checks SIRs with interferers on hills. The test computes these SIRs itself from the heights of the hills.
 #[test]
 fn interferers_stand_on_the_ground() {
     let folder = tempfile::tempdir().unwrap();

@@ -86,7 +86,7 @@ pub(crate) struct Ascent {
     /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. This limit is lowered if relays
     /// are too near the interferer: a large slack would outweigh the penalty for such relays.
     spare: f32,
-    /// Penalty for relays too near the interferer, m. It is subtracted from the chain's slack.
+    /// Penalty for relays too near the interferer, m, subtracted from the chain's slack.
     pub(crate) penalty: f32,
     distance_m: f32,
     /// Change of the chain's slack per unit of ln(target SIR), m; below 0.

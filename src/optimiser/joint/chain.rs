@@ -54,7 +54,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, that leaves the relays toward Rx their minimum separation.
+    /// Returns the largest x of a relay, m, at which the relays toward Rx still fit with their separation.
     ///
     /// `end_m` is the largest x of the next relay toward Tx, m, and `step` the minimum difference in x from that relay,
     /// m.
@@ -129,7 +129,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the chain for `target`, m, and its derivatives. They are by the last relay's position `at`.
+    /// Returns the slack of the chain for `target`, m, and the derivatives of the slack. The derivatives are by the
+    /// last relay's position `at`.
     ///
     /// The slack is the maximum length of the last hop for `target`, minus the length of this hop.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
@@ -153,8 +154,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the lowest target, in ln(SIR), at which every hop has a finite maximum length. It is just above the
-    /// largest gain of a hop. At a lower target, a hop that starts beyond the interferer could have any length.
+    /// Returns the lowest target, in ln(SIR), at which every hop has a finite maximum length. This target is just above
+    /// the largest gain of a hop. At a lower target, a hop that starts beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -252,7 +253,7 @@ pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
 /// Stored state of the solver for one segment, which is ten consecutive relays. It has the x of the last relay before
-/// the segment, and derivatives of the chain's slack. They are by the position of the segment's last relay.
+/// the segment, and derivatives of the chain's slack. The derivatives are by the position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the last relay before this segment, m.

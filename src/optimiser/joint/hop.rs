@@ -59,8 +59,8 @@ pub(super) struct Reach {
     /// the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value for each coordinate
     /// of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end. They are by the two free coordinates w_1 and
-    /// w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end. The derivatives are by the two free coordinates
+    /// w_1 and w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
     /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m. The two free coordinates are
     /// constant.

@@ -32,8 +32,7 @@ impl Noted for [f32; 2] {
 /// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx and at the end of the pass
-    /// back.
+    /// Index of the relay that the pass has computed last. 0 before the pass to Rx, and at the end of the pass back.
     index: u16,
     /// True during the pass along the chain from Rx back to Tx.
     is_back: bool,
@@ -42,7 +41,7 @@ pub(super) struct Line {
     /// x of relay `index`, m. In the pass to Rx it is the farthest x that meets the target; in the pass back it is
     /// the final x.
     x_m: f32,
-    /// Upper limit of the x of relay `index`, m, which leaves the relays toward Rx their separation.
+    /// Upper limit of the x of relay `index`, m. Up to this x, the relays toward Rx fit with their separation.
     end_m: f32,
 }
 
@@ -130,8 +129,7 @@ impl Line {
         Some(())
     }
 
-    /// Computes the final x of the next relay toward Tx from relay `index`, which is at `x_m`. `None` if `target`
-    /// cannot be met.
+    /// Computes the final x of relay `index` - 1, with relay `index` at `x_m`. `None` if `target` cannot be met.
     fn back<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -230,7 +228,7 @@ impl<const RELAYS: usize> Cells<RELAYS> {
         chain.mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays toward Rx their separation.
+    /// Returns the largest x of relay `index`, m, at which the relays toward Rx fit with their separation.
     pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
         let first = chain.distance_m() - steps.clone().sum::<f32>();

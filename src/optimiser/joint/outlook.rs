@@ -12,8 +12,8 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. It assumes that the
-/// relays toward Rx react optimally.
+/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. The function assumes
+/// that the relays toward Rx react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack with respect to the relay's x, y and h, m per m.

@@ -318,7 +318,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay. Each has three bytes, as a fraction of the allowed range.
+/// Stored lateral offset and altitude of one relay: three bytes for each, as a fraction of the allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
@@ -479,16 +479,16 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Weight of the penalty for a violated minimum separation, in units of the distance from Tx to Rx. It is so large that
-/// a violation always costs more slack than it adds.
+/// Weight of the penalty for a violated minimum separation, in units of the distance from Tx to Rx. The weight is so
+/// large that a violation never improves a chain.
 const STIFFNESS: f32 = 100.0;
 
 /// Distance from a limit of a coordinate's range, within which the relay counts as at the limit. The unit is the
 /// distance from Tx to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference of a hop's squared length from its maximum, up to which it counts as maximum. It is for hops
-/// that end at the x of Rx. A shorter hop does not restrict the move of its receiver.
+/// Relative difference of a hop's squared length from its maximum, up to which it counts as maximum. Used for hops that
+/// end at the x of Rx. A shorter hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {

@@ -24,8 +24,8 @@ pub(super) enum Start {
     /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
     /// Initial chain on a parabola as for `Arch`, but without a minimum separation. The solver then searches the
-    /// highest target of this chain. It computes the hops exactly as the relays do in flight, and a relay is allowed to
-    /// stay closer to Tx than its farthest x.
+    /// highest target of this chain. The solver computes the hops exactly as the relays do in flight, and a relay is
+    /// allowed to stay closer to Tx than its farthest x.
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The

@@ -34,8 +34,8 @@ pub struct Hello {
     /// - If the sender is outside of the chain: true if it would join the chain when it is called.
     /// - If the destination is outside of the chain: true if the destination is called to join.
     pub ready: bool,
-    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are the
-    /// connected relays from the sender on, in the direction away from the destination.
+    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. Counted are
+    /// the connected relays from the sender on, in the direction away from the destination.
     pub behind: u16,
     /// Nodes that the sender receives on the side where the destination is. Bit i, 0 to 3, stands for the node whose
     /// number differs from the sender's by i + 1.
@@ -59,8 +59,8 @@ pub struct Hello {
 }
 
 impl Hello {
-    /// Returns true if the sender of this hello, node `by`, receives node `of`. False for nodes more than four
-    /// numbers away.
+    /// Returns true if the sender of this hello, node `by`, receives node `of`. False if the two node numbers differ by
+    /// more than four.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1

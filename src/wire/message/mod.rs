@@ -103,8 +103,8 @@ pub enum Message {
     Decision(Decision),
     /// Message toward Tx or toward Rx: limit of x (fence) that keeps two neighbouring relays separated.
     Fence {
-        /// Digest by which two neighbours detect that they use different x axes. It covers the mission loaded before
-        /// flight, and the Tx and Rx positions of an uploaded mission.
+        /// Digest by which two neighbours detect that they use different x axes. The digest covers the mission loaded
+        /// before flight, and the Tx and Rx positions of an uploaded mission.
         line_digest: u16,
         /// Content of the message: the sender's limit of x, the x of its agreed position, and flags.
         fence: Fence,
@@ -188,8 +188,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward in the direction of a pass. They are passes, proposals and lease
-    /// renewals, but not the replies.
+    /// Returns true for messages that relays forward in the direction of a pass. These are passes, proposals and lease
+    /// renewals, but not the replies to them.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

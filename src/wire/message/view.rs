@@ -32,15 +32,15 @@ pub struct Poll {
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
     /// True if the proposer of the view `agreed` was polled. For the initial view the leader counts as the proposer. If
-    /// it was, exactly half of the members' votes are enough for a quorum.
+    /// the proposer was polled, exactly half of the members' votes are enough for a quorum.
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
     /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Until
     /// then relays must not use positions of the new view.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a polled member has accepted; `None` if there is none. This view may be agreed
-    /// on already.
+    /// Latest view after `agreed` that a polled member has accepted; `None` if there is none. The chain may have agreed
+    /// on this view already.
     pub successor: Option<Successor>,
 }
 
@@ -58,7 +58,7 @@ impl Poll {
     }
 }
 
-/// View that a polled relay has accepted in an earlier decision. This view may be agreed on already.
+/// View that a polled relay has accepted in an earlier decision. The chain may have agreed on this view already.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {

@@ -17,8 +17,8 @@ pub struct AttackCountsReport {
     pub taken: u64,
     /// Number of the attacker's frames by the counter that they incremented at the receiver.
     ///
-    /// The counters are those of a relay. `received` counts accepted frames. Each other counter stands for a reason of
-    /// rejection.
+    /// The counters are those of a relay. `received` counts accepted frames. Each of the remaining counters stands for
+    /// a reason of rejection.
     pub counted: BTreeMap<&'static str, u64>,
 }
 

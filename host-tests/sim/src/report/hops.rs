@@ -204,8 +204,8 @@ impl WorstBack {
     }
 }
 
-/// Relative difference up to which the worst SIR toward Rx and that toward Tx count as equal. It is 0.004 dB, more than
-/// the rounding errors.
+/// Relative difference up to which the worst SIR toward Rx and that toward Tx count as equal. The difference is 0.004
+/// dB, more than the rounding errors.
 const EQUAL: f64 = 1e-3;
 
 /// Returns the name of the direction with the lower SIR: `forward`, `backward`, or `both` if equal. `there` is the

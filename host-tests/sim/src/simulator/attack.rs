@@ -237,7 +237,7 @@ fn false_message(
     copy.unwrap_or_else(|| random_message(mission, way, rng))
 }
 
-/// Returns a copy of a recorded frame with false values. Its pass number is the same or slightly higher.
+/// Returns a copy of a recorded frame with false values. The pass number of the copy is the same or slightly higher.
 ///
 /// `None` unless the frame is a message that relays pass along the whole chain, or a reply to one.
 fn altered_copy(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {

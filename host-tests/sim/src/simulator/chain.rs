@@ -34,8 +34,8 @@ use ground::{Station, stations};
 use judge::ChangedRelays;
 pub use live::LiveRelay;
 
-/// Largest number of events in a run. It ends runs in which the relays never agree on positions, after some minutes of
-/// computing.
+/// Largest number of events in a run. This limit ends runs in which the relays never agree on positions, after some
+/// minutes of computing.
 const MAX_EVENTS: u64 = 400_000_000;
 
 impl Chain {

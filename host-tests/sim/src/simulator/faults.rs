@@ -108,7 +108,8 @@ impl Faults {
 /// In the bad state the link loses all frames, in the good state no frames.
 #[derive(Debug)]
 pub struct Bursts {
-    /// Mean fraction of frames that the link loses, 0 to 1. It equals the fraction of frames that find the link in its bad state.
+    /// Mean fraction of frames that the link loses, 0 to 1. This is also the fraction of frames that find the link in
+    /// its bad state.
     share: f64,
     /// Probability that a link in the good state is in the bad state for the next frame.
     worsens: f64,
@@ -203,7 +204,7 @@ impl LinkSpec {
         Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain. It includes 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain. The time includes 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let frame = self.line_time(MAX_SWEEP).as_micros();
         Duration::from_micros(frame + self.latency.as_micros() + 1_000)

@@ -60,7 +60,7 @@ impl FleetSpec {
     }
 }
 
-/// Returns a geographic line of `distance_m` metres at an arbitrary place. It is for a scenario without such a line.
+/// Returns a geographic line of `distance_m` metres at an arbitrary place. Used for a scenario without such a line.
 ///
 /// The line leads eastward from 47.4 N, 8.54 E. `None` if no line can have this length.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
@@ -259,7 +259,7 @@ impl Vehicle {
         self.landed == IN_AIR && self.mode != Mode::Manual && self.is_not_taken_over(now)
     }
 
-    /// Restarts the autopilot in flight. It is silent for the time [`AWAY`].
+    /// Restarts the autopilot in flight. The autopilot is silent for the time [`AWAY`].
     pub(super) fn restart(&mut self, now: Instant) {
         self.away_until = Some(now + AWAY);
         self.mode = Mode::Hold;

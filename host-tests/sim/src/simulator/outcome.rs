@@ -228,8 +228,8 @@ pub struct Outcome {
     pub margin_m: f64,
     /// Relays that forward data at each time step: number from 1, and true position of the drone.
     ///
-    /// Recorded for drones without autopilots if [`Setup::track`](super::setup::Setup::track) is set. These are the living relays with a
-    /// setpoint, without spares and relays that may leave.
+    /// Recorded for drones without autopilots if [`Setup::track`](super::setup::Setup::track) is set. Included are the
+    /// living relays with a setpoint, except spares and relays that may leave.
     pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
     /// Two drones, their distance, and the time of the smallest margin, `margin_m`.
     pub margin_at: Option<Nearest>,

@@ -374,7 +374,8 @@ impl Members {
 
     /// Returns the number (from 0) and the present position of each relay in the view.
     ///
-    /// A relay without a position gets an arbitrary one. It has no effect, because the relay's hops carry no data.
+    /// A relay without a position gets an arbitrary one. This position has no effect, because the relay's hops carry no
+    /// data.
     fn places(&self) -> Vec<(usize, Point)> {
         let place = |(index, member): (usize, &Option<(usize, RelayState)>)| {
             let known = member.and_then(|(relay, state)| Some((relay, state.observed.place?)));
@@ -419,7 +420,7 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction. They are assigned anew at each agreement and for each new view
+/// Time slots of all hops, for each direction. The slots are assigned anew at each agreement and for each new view
 /// (membership).
 struct Layout {
     view: ViewId,

@@ -98,7 +98,7 @@ pub struct Setup {
     pub reserve: Option<Duration>,
     /// Values of a drone's remaining endurance beyond the way home, as given to its relay.
     ///
-    /// Each has the relay's number from 1, the time, and the endurance, s.
+    /// Each entry has the relay's number from 1, the time, and the endurance, s.
     pub endurances: Vec<(u16, Instant, u16)>,
     /// Relays that wait outside of the chain from the start until the leader calls them, by number from 1.
     pub spares: Vec<u16>,
@@ -249,7 +249,7 @@ impl Setup {
         })
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain. It includes 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain. The time includes 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let latency = Duration::from_micros(self.link.latency.as_micros() + 1_000);
         self.load().map_or(self.link.hop_time(), |load| {

@@ -64,7 +64,8 @@ impl Watch {
         }
     }
 
-    /// Replaces the state of relay `at` (from 0) and updates the smallest distance. Returns true on a change.
+    /// Replaces the state of relay `at` (from 0) and updates the smallest distance. Returns true if the state has
+    /// changed.
     pub fn record_state(&mut self, at: usize, seen: ObservedState) -> bool {
         let Some(known) = self.states.get_mut(at) else {
             return false;

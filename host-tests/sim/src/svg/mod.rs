@@ -137,8 +137,8 @@ const FARTHEST: f64 = 2.0;
 
 /// Lateral extent of the view from above toward an interferer that is too far away to show.
 ///
-/// It is a fraction of the distance from Tx to Rx, and leaves space for an arrow. It applies if relays must stay on the
-/// line, because the view then shows no lateral limits.
+/// The extent is a fraction of the distance from Tx to Rx, and leaves space for an arrow. It is used if relays must
+/// stay on the line, because the view then shows no lateral limits.
 const TOWARD_FAR: f64 = 0.4;
 
 /// Draws the view from above. `side` has the scale of x in the side view; `view` has the relays' lateral offsets.

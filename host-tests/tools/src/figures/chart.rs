@@ -53,7 +53,7 @@ pub struct Line {
 /// Style of a curve: colour, stroke and markers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
-    /// Number of the colour, 0 to 6. It also selects the shape of the markers.
+    /// Number of the colour, 0 to 6. The number also selects the shape of the markers.
     pub hue: usize,
     /// Stroke between the curve's points: full, dashed or dotted.
     pub stroke: Stroke,

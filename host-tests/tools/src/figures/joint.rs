@@ -30,7 +30,7 @@ struct Row {
     adjust_sir_linear: f64,
     /// Number of messages of Algorithm 1 and then Algorithm 2.
     adjust_messages: u64,
-    /// SIR of the joint method, linear. It chooses positions and altitudes together.
+    /// SIR of the joint method, linear. This method chooses positions and altitudes together.
     joint_sir_linear: f64,
     joint_passes: u32,
     joint_messages: u64,

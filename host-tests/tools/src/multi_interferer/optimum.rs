@@ -310,8 +310,8 @@ impl<'a> Stages<'a> {
 
     /// Returns the x of each relay, m, in a chain that meets the target SIR. [`Stages::is_met`] must be true.
     ///
-    /// The x rise from Tx to Rx. The hops are as equal as the target allows. `None` if the feasible positions are not
-    /// connected.
+    /// The x rise from Tx to Rx. The lengths of the hops differ as little as the target allows. `None` if the feasible
+    /// positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;

@@ -51,8 +51,8 @@ struct Turn<'a> {
 
 /// Improves the chain `start` by moving one relay at a time within the limits `room`.
 ///
-/// The result is never worse than `start`. It keeps order and minimum separation if `start` does. A relay with a fixed
-/// altitude moves only along x and y. `None` unless `start` has one position per relay and at least one relay.
+/// The result is never worse than `start`. The result keeps order and minimum separation if `start` does. A relay with
+/// a fixed altitude moves only along x and y. `None` unless `start` has one position per relay and at least one relay.
 ///
 /// The search ends after 200 rounds, or after three rounds in a row that each gain less than a millionth. A round is 2
 /// N moves. A move computes about 50 SIRs at one altitude, and 2 400 in a range of altitudes. Free lateral positions
@@ -91,7 +91,7 @@ pub fn polish(
 
 /// Moves relay `at` (from 0) if that raises the SIR of the worse of its two hops.
 ///
-/// Altitude and lateral position are searched above and below the present values. They change by at most the fraction
+/// Altitude and lateral position are searched above and below the present values. Both change by at most the fraction
 /// `window` of the permitted ranges `room`.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
     let relays = &scene.relays;

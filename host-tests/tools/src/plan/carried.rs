@@ -48,9 +48,9 @@ pub struct Carried<'a> {
 impl<'a> Carried<'a> {
     /// Creates the planner for up to `most` relays; `None` if the positions with the best SIR suffice.
     ///
-    /// They suffice if they also maximise the data rate: with equal time slots or a frequency for each hop, for data in
-    /// one direction or at equal rates in both. They also suffice where this planner cannot search better positions:
-    /// with free altitudes, a given x, several interferers, or interference known only along the line Tx-Rx.
+    /// These positions suffice if they also maximise the data rate: with equal time slots or a frequency for each hop,
+    /// for data in one direction or at equal rates in both. They also suffice where this planner cannot search better
+    /// positions: with free altitudes, a given x, several interferers, or interference known only along the line Tx-Rx.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -85,7 +85,7 @@ impl<'a> Carried<'a> {
     /// Returns the largest number of relays for which a precise search is worthwhile.
     ///
     /// With more relays, one bit takes over 5 % more time on the coarse grid than with the best number. A precise
-    /// search cannot make up for this. It is used for fitted time slots (as long as each hop needs).
+    /// search cannot make up for this. The precise search is used for fitted time slots (as long as each hop needs).
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }

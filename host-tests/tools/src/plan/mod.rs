@@ -441,7 +441,7 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the relays have no minimum separation, or if it costs no SIR.
+/// Returns true if the relays have no minimum separation, or if the separation costs no SIR.
 ///
 /// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR is not higher
 /// without the separation, and `None` if it finds no chain.

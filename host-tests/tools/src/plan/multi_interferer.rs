@@ -197,8 +197,9 @@ impl Planner<'_> {
 
     /// Returns scenarios with a single interferer. Their best chains are further start chains.
     ///
-    /// They vary the scenario of the hypothetical interferer. This interferer is mirrored about the line Tx-Rx, or
-    /// replaced by one of the first real interferers. Or relays may leave the line to one side only, or not at all.
+    /// The scenarios are variations of the one with the hypothetical interferer. This interferer is mirrored about the
+    /// line Tx-Rx, or replaced by one of the first real interferers. Or relays may leave the line to one side only, or
+    /// not at all.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();

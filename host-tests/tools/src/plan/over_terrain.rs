@@ -106,7 +106,7 @@ pub struct Search<'a> {
     /// Least and greatest height above the ground, m.
     clearance_m: [f64; 2],
     position_error_m: f64,
-    /// True if the scenario's range of altitudes limits the altitudes, too.
+    /// True if altitudes must also be within the scenario's range of altitudes.
     is_banded: bool,
     losses: HashMap<[[u64; 2]; 2], f64>,
     no_fly: Vec<NoFly>,

@@ -438,7 +438,7 @@ fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     to.x - squared.sqrt()
 }
 
-/// Returns the longest hop along x, m, from the next node to `to` with the SINR `sinr`.
+/// Returns the largest distance along x, m, at which `to` receives the next node with the SINR `sinr`.
 ///
 /// `None` if the next node is too weak at any x.
 fn reach(hop: &Hop, sinr: f64, to: Point) -> Option<f64> {

@@ -105,8 +105,8 @@ impl LogGains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. Both are in units of the
-    /// interferer's power received at the distance D, the distance from Tx to Rx.
+    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. The unit of interference and
+    /// noise is the interferer's power received at the distance D from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;

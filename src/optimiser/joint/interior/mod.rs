@@ -51,11 +51,11 @@ const LAST_MU: f32 = 1e-4;
 /// Factor on the barrier weight, applied once a Newton step raises the merit only a little.
 const LESS: f32 = 0.3;
 
-/// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. It applies after
-/// more than half of a Newton step. The merit is the maximised function.
+/// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. This limit applies
+/// after more than half of a Newton step. The merit is the maximised function.
 const SETTLED: f32 = 0.1;
-/// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. It applies after a
-/// Newton step of any length. The merit is the maximised function.
+/// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. This limit applies
+/// after a Newton step of any length. The merit is the maximised function.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
@@ -184,8 +184,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Minimum distances along x: of relay 1 from Rx, and of the last relay from Tx. They are fractions of the distance
-    /// from Tx to Rx.
+    /// Minimum distances along x: of relay 1 from Rx, and of the last relay from Tx. The unit is the distance from Tx
+    /// to Rx.
     pub(super) closed: [f32; 2],
     pub(super) nodes: [Node; RELAYS],
     last: Hop,
@@ -338,7 +338,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the stored levels and Lagrange multipliers of hop `k`. It leads to relay `k`, or to Rx if `k` is N + 1.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`. Hop `k` leads to relay `k`, or to Rx if `k` is N
+    /// + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {

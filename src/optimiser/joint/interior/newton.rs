@@ -270,8 +270,7 @@ impl Factor {
         rows: [[0.0; 5]; 3],
     };
 
-    /// Returns this relay's Newton step. It follows from the target's step `by_target` and the next relay's step
-    /// `next`.
+    /// Returns this relay's Newton step. `by_target` is the target's step, and `next` the next relay's step.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
         let known = (self.rows)
             .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));

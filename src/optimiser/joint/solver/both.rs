@@ -389,6 +389,6 @@ const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// First target to try, minus the target of the interior-point method, in ln(SIR). It is the possible error of this
-/// method.
+/// First target to try, minus the target of the interior-point method, in ln(SIR). The difference allows for the error
+/// of this method.
 const ABOVE: f32 = 1e-4;

@@ -287,7 +287,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         cell.unwrap_or_default().place(seat.room)
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays toward Rx their separation.
+    /// Returns the largest x of relay `index`, m, at which the relays toward Rx fit with their separation.
     ///
     /// The chain must be solved. The limit is equal, to the bit, to the limit that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {

@@ -106,7 +106,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 
     /// Continues the forward pass by one segment. If the moves of its relays are not in memory, computes them instead.
-    /// The pass tries the fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if
+    /// The pass tries the fraction `share` of the moves with the target `sigma`, in ln(SIR). The chain is stored if
     /// `kept` is true.
     pub(super) fn forward(
         &mut self,

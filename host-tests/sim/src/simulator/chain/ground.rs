@@ -84,7 +84,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Measures the interference at the ground stations at Tx and Rx. They send the results to the relays.
+    /// Measures the interference at the ground stations at Tx and Rx. The stations send the results to the relays.
     pub(super) fn measure_at_ends(&mut self, true_interference: &TrueInterference, scene: &Scene) {
         for at in 0..self.stations.len() {
             if let Some(station) = self.stations.get_mut(at) {
