@@ -30,7 +30,7 @@ pub struct Stats {
     /// Received intact frames without an authentication tag, if this relay has a key. If it has no key: received
     /// mission offers, because offers are accepted only with a key.
     pub unsigned: u32,
-    /// Intact frames with a wrong authentication tag: sent without the key, altered, or of an earlier epoch.
+    /// Intact frames with a wrong authentication tag: sent without the key, altered, or of an old epoch.
     pub forged: u32,
     /// Frames with the right authentication tag that were received before, or are too old to check.
     pub replayed: u32,

@@ -30,11 +30,12 @@ pub struct Report {
     pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
-    /// Reasons why the drone holds its position: the first for the neighbour toward Tx, the second for that toward Rx.
+    /// Reasons why the drone holds its position. The first is about the neighbour toward Tx, the second about the one
+    /// toward Rx.
     pub hold_reasons: [Option<HoldReason>; 2],
     /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],
-    /// Flags for the neighbours toward Tx and toward Rx: true if the relay does not receive the neighbour now.
+    /// Flags for the neighbours toward Tx and toward Rx: true if the relay does not receive it now.
     pub silent: [bool; 2],
     /// True if the relay has received a second node with its number within three times `dead_after`.
     pub is_duplicated: bool,
@@ -72,7 +73,7 @@ const CONTROLS: [State; 6] = [
     State::Engaged,
 ];
 
-/// Number of a control state: the relay controls the drone, but the autopilot does not fly to the setpoint.
+/// Number of a control state. The relay controls the drone, but the autopilot does not fly to the setpoint.
 pub(crate) const REFUSED: u16 = 6;
 
 /// Hold reasons in the order of their numbers in a report, from 1.

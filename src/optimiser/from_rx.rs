@@ -71,7 +71,7 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the length margin of the hop from Rx to the last relay at `x_m`, m: (SIR / required SIR - 1) D.
+    /// Returns the margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
     ///
     /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. The margin is a continuous
     /// function of `target`.

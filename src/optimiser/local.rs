@@ -264,8 +264,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search: at most `budget` evaluations of both hops, plus the evaluations for one altitude. One
-    /// altitude takes 24 evaluations, or 194 for data in both directions.
+    /// Continues the search by at most `budget` evaluations of both hops, plus those for one altitude. One altitude
+    /// takes 24 evaluations, or 194 for data in both directions.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {

@@ -79,9 +79,9 @@ pub struct Retreat<'a> {
     /// Smallest permitted x of this hop's sender, m; Tx is at x = 0.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from this hop's receiver to this hop's sender: its gain, and the interference at the sender. `None`
-    /// for data in one direction. The gain is for the field's largest Upsilon = E[1/I]. This gain is divided by r, the
-    /// required ratio of backward to forward SIR.
+    /// Backward hop from this hop's receiver to its sender: gain, and interference at the sender. `None` for data in
+    /// one direction. The gain is for the field's largest Upsilon = E[1/I]. This gain is divided by r, the required
+    /// ratio of backward to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }
 

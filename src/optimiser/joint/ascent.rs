@@ -10,8 +10,8 @@ use super::outlook::Outlook;
 /// Fractions of the relays' computed moves. An iteration tries them in this order until the chain improves.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move of a relay in an iteration, divided by the relay's distance to the interferer. The trust
-/// also limits the change of ln(target SIR).
+/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. The trust also
+/// limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
 /// Minimum trust (limit of the relays' moves) at which the final target of an improvement is predicted. With a smaller

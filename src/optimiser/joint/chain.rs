@@ -248,7 +248,8 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays whose computed moves are in memory at one time: one segment, or 0 without the feature `altitude`.
+/// Number of relays whose computed moves are in memory at one time. It is one segment, or 0 without the feature
+/// `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 

@@ -120,8 +120,8 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains, the ratio r of the data rate to Tx and the data rate to Rx, and the separation.
-/// `gains` has the gain toward Rx and the gain toward Tx, each divided by the SNR gap.
+/// Hop between two nodes: its gains, r, and the minimum separation. r is the data rate to Tx divided by the data rate
+/// to Rx. `gains` has the gain toward Rx and the gain toward Tx, each divided by the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],

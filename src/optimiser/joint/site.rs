@@ -318,7 +318,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay: three bytes for each, as a fraction of the allowed range.
+/// Stored lateral offset and altitude of one relay. Three bytes for each hold a fraction of the allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 

@@ -6,7 +6,7 @@ use uav_relay::{Duration, Instant, Placement};
 
 use uav_relay_scenario::number::narrow;
 
-/// Position [x, y, height], m: x from Tx toward Rx, y to the right as seen from Tx, height above ground.
+/// Position [x, y, height], m. x is from Tx toward Rx, y to the right as seen from Tx.
 pub type Point = [f64; 3];
 
 /// Converts a relay's placement to a position in f64.

@@ -22,7 +22,7 @@ pub struct Takeover {
     /// After the end the pilot hands the drone back to its relay, as soon as the drone hovers and no second drone moves
     /// nearby.
     pub until: Option<Instant>,
-    /// Position to which the pilot flies the drone: x along the line from Tx to Rx, y to the right, and height, m.
+    /// Position to which the pilot flies the drone, m: x from Tx toward Rx, y to the right, and height.
     ///
     /// `None` to climb in place.
     pub to: Option<Point>,

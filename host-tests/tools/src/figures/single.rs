@@ -39,7 +39,8 @@ struct Row {
     random_sir_db: f64,
     /// Mean over random positions of log2(1 + SIR) of the worse hop, bit/s/Hz.
     random_rate_bit_per_s_hz: f64,
-    /// SIR of the worse hop, linear, with the relay at the blind position: there the weaker signal is strongest.
+    /// SIR of the worse hop, linear, with the relay at the blind position. There the weaker received signal is
+    /// strongest.
     ///
     /// This position does not depend on the interference.
     blind_sir_linear: f64,

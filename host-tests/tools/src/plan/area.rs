@@ -242,7 +242,7 @@ fn places_of(plan: &Plan) -> Vec<Place> {
 /// Position x, y and altitude, m.
 type Point = [f64; 3];
 
-/// Returns the paths of two neighbours when a gap is closed: each flies to the position of the other one.
+/// Returns the paths of two neighbours when a gap is closed. Each flies to the position of the other one.
 ///
 /// A relay flies straight to its new position. A relay that `keeps` its altitude, as with Algorithm 1, flies level.
 pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {

@@ -150,7 +150,7 @@ fn is_located(scenario: &Scenario, cell: &Cell) -> bool {
     cell.error_m.is_some_and(|error| error <= LOCATED * apart_m)
 }
 
-/// Returns the positions at which the relays measure: those before the first estimate, and the planned ones.
+/// Returns the positions at which relays measure: before the first estimate, and the planned ones.
 fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     let relays = plan.places.len() as f64;
     // Hops of equal length. For one or two relays also: the first hop half as long, and the last hop half as long.

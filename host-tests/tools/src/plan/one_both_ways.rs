@@ -32,7 +32,7 @@ use uav_relay_scenario::scene::Scene;
 pub struct Best {
     /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
-    /// Reason for the position: 1 if above Tx, 2 if above Rx, 3 if two SIRs are equal, 4 if one SIR is maximal.
+    /// Reason for the position. 1: above Tx, 2: above Rx, 3: two SIRs are equal there, 4: one SIR is maximal there.
     pub case: u8,
     /// Explanation, for the user, of why the relay goes to its position.
     pub words: String,

@@ -257,7 +257,7 @@ pub struct WayBack {
     /// SIRs toward Tx are first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_direction: Option<&'static str>,
-    /// Node that receives the worst hop in the direction from Rx to Tx: 0 for Tx, otherwise a relay's index.
+    /// Node that receives the worst hop for data from Rx to Tx: 0 for Tx, otherwise a relay's index.
     #[serde(skip)]
     hop: usize,
     #[serde(skip)]

@@ -284,7 +284,8 @@ fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     }
 }
 
-/// Returns two silences of a neighbour: a relay requests heartbeats after the first, and it is lost after the second.
+/// Returns two silences of a neighbour. After the first a relay requests heartbeats, after the second the neighbour is
+/// lost.
 ///
 /// 0 selects the firmware's default.
 pub fn silence(probe_after_ms: u32) -> [Duration; 2] {

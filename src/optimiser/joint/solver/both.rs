@@ -47,8 +47,8 @@ struct Start {
 enum Along {
     /// Use of Algorithm 1 for the x, with the relays' lateral offsets and altitudes.
     Line,
-    /// Even spacing; distances of the first and the last relay from the end (Tx or Rx) with more power. They are
-    /// fractions of the distance from Tx to Rx.
+    /// Spacing in equal steps, from the first to the last relay. The fields are the distances of these two relays from
+    /// the end (Tx or Rx) with more power. They are fractions of the distance from Tx to Rx.
     Even([f32; 2]),
     /// Use of Algorithm 1 for the x, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow
     /// part of an ellipse down to the end (Tx or Rx) with less power.
@@ -255,8 +255,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Excludes some x for the relay next to the end (Tx or Rx) with more power: those beyond the interferer. At these
-    /// x the SIR of this relay rises with its distance from that end.
+    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. At these x the
+    /// SIR of this relay rises with its distance from that end.
     ///
     /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
     /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
