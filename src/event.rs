@@ -27,8 +27,8 @@ pub enum Event {
     ///
     /// The neighbour has answered nothing for at least `Settings::dead_after` (15 s by default), and has left at least
     /// 16 requests unanswered. On a channel that loses frames the event is raised later, after at most eight times
-    /// `dead_after`. With two links the relay keeps sending heartbeat requests to the neighbour; on a shared channel it
-    /// searches for another node at that side. An operator looks for that drone. Once it has landed,
+    /// `dead_after`. On separate links the relay keeps sending heartbeat requests to the neighbour; on a shared channel
+    /// it searches for a different node at that side. An operator looks for that drone. Once it has landed,
     /// `Relay::clear_lost` frees the space around its last position.
     NeighbourLost {
         /// Side of this relay, toward Tx or toward Rx, on which the lost neighbour is.
@@ -134,8 +134,8 @@ pub enum Event {
     ///
     /// Raised if a value of `Relay::handle_endurance` was invalid, if none came for 10 s, or if none is known while the
     /// relay controls the drone. The relay then counts down from the last value that agreed with the value before it,
-    /// or else from the last value. Without any valid value the relay does not leave the chain by itself. Raised at
-    /// most once a minute while the time is unknown.
+    /// or else from the last value. If there was no valid value, the relay does not leave the chain by itself. Raised
+    /// at most once a minute while the time is unknown.
     EnduranceUnknown,
     /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while
     /// this is the case.

@@ -39,7 +39,7 @@ impl Placement {
     }
 }
 
-/// Lateral offset and altitude of a relay: its position without x.
+/// Lateral offset and altitude of a relay: its position except for x.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {

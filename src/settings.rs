@@ -131,7 +131,7 @@ pub struct Settings {
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
-    /// Key and epoch for signing frames. With a key the relay accepts signed frames only; without one, it accepts
+    /// Key and epoch for signing frames. A relay with a key accepts only signed frames; a relay without a key accepts
     /// frames from any sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
     /// Maximum time from `poll_transmit` at one relay to `poll_transmit` at the next relay; above 0. The time is for

@@ -47,8 +47,8 @@ pub struct MissionConfig {
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: of one transmitter at a known or unknown position, or a field. A field gives its
-    /// distribution for every x.
+    /// Interference on the hops: of one transmitter at a known or unknown position, or a field. A field gives the
+    /// distribution of the interference for every x.
     pub interference: Interference,
     /// Noise power at the input of every receiver, W: 0 to 1. At most 1e12 times the interferer's power received at 1
     /// m. 0 is the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
@@ -58,12 +58,12 @@ pub struct MissionConfig {
     /// 0 means data from Tx to Rx only, as in the paper. Above 0, once the interference is known, a hop counts by the
     /// lower of two values: the SIR toward Rx, and the SIR toward Tx divided by r.
     pub reverse: f32,
-    /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
+    /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. It has no effect if `reverse` is
     /// 0.
     pub rx_power_w: f32,
-    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, each time slot is as long as its
-    /// hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is
-    /// log2(1 + SINR / gap).
+    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. If the gap is not 0, each time slot is as long as
+    /// its hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is log2(1 + SINR /
+    /// gap).
     pub fitted_gap: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain is accepted if its SIR is within this fraction of the best
     /// SIR.

@@ -534,7 +534,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     }
 
     /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. With `index` 0,
-    /// `Some` with any number means that all relays can.
+    /// the result is `Some` if all relays can, whatever the number.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -563,8 +563,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. With `index` 0,
-    /// `Some` with any number means that all relays can.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. With `index` 0, the
+    /// result is `Some` if all relays can, whatever the number.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

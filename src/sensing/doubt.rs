@@ -46,8 +46,8 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of consistent measurements, divided by the variance that the operator expects. Above it, the leader
-/// searches for a faulty relay.
+/// Maximum variance of consistent measurements, divided by the variance that the operator expects. With a larger
+/// variance, the leader searches for a faulty relay.
 const OUT_OF_LINE: f64 = 4.0;
 
 /// Minimum drop of the fit's residual without the faulty relay. The unit is the variance of the remaining measurements.
@@ -322,8 +322,8 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
 /// larger limit counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
-/// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
-/// faulty.
+/// Minimum number of relays to check the levels measured at Tx and Rx. With fewer relays it is unknown which
+/// measurement is faulty.
 const FEWEST_FOR_ENDS: u16 = 3;
 
 /// Level measured at Tx or Rx divided by the expected level, and the relative variance of this ratio.

@@ -340,7 +340,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
 }
 
 /// Returns a function that converts the terms of a position to v = 1e-12 W / I there. I is the interference power of
-/// the mission's interferer. The function gives `None` without a known source, or outside of the measurable range.
+/// the mission's interferer. The function gives `None` if the source is not known, or if v is outside of the measurable
+/// range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()

@@ -80,8 +80,8 @@ fn add(crc: &mut Digest<'_, u32, Table<1>>, bytes: &[u8]) {
     crc.update(bytes);
 }
 
-/// Returns `digest` combined with `sites`, the Tx and Rx positions of an uploaded mission. With `None` the result is
-/// `digest`.
+/// Returns `digest` combined with `sites`, the Tx and Rx positions of an uploaded mission. If `sites` is `None`, the
+/// result is `digest`.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();

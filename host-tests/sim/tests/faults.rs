@@ -236,7 +236,7 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
     all
 }
 
-/// Describes the fault at the end of a run with a one-way link. `None` without a fault.
+/// Describes the fault at the end of a run with a one-way link. `None` if there is no fault.
 ///
 /// All relays, except one of the two at the failed link, must have positions in one view, without changes in the last
 /// [`STILL_S`].

@@ -75,8 +75,8 @@ const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m, that maximise the weakest received signal. Interference is ignored.
 ///
-/// All relays get the altitude and power of the first relay. Empty without relays. The cost is 200 computations of a
-/// chain's length.
+/// All relays get the altitude and power of the first relay. The list is empty if the scene has no relays. The cost is
+/// 200 computations of a chain's length.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
         return Vec::new();

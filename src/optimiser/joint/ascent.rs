@@ -18,7 +18,7 @@ const TRUST: f32 = 0.5;
 /// trust the predicted target would be too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust (limit of the relays' moves) below which the improvement of a chain ends without progress.
+/// Trust (limit of the relays' moves) below which the improvement of a chain is given up.
 const LEAST_TRUST: f32 = 1e-4;
 
 /// Minimum length by which a chain is assumed to shrink per unit of ln(target SIR). The unit is the distance from Tx to

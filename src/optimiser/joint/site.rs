@@ -266,7 +266,7 @@ impl<'a> Site<'a> {
 
 /// Returns the coordinate of a hop's end at which the hop just meets its target, m. The triples have this coordinate
 /// first; `a` and `b` are the two known coordinates of the hop's end. If there are two solutions, `rising` selects the
-/// larger solution. `None` without a solution.
+/// larger solution. `None` if there is no solution.
 fn follows(
     tangent: &Tangent,
     rising: bool,

@@ -71,8 +71,8 @@ pub enum Message {
     },
     /// Message toward Tx or toward Rx: heartbeat request, reply, or both.
     Heartbeat {
-        /// Digest of the sender's mission as loaded before flight. With it, nodes detect different missions before
-        /// take-off.
+        /// Digest of the sender's mission as loaded before flight. By this digest, nodes detect different missions
+        /// before take-off.
         mission: u16,
         /// Number of the sender's own heartbeat request, 0 for none.
         request: u16,

@@ -45,7 +45,7 @@ pub struct ChainReport {
     pub uavs: u16,
     /// Version of the mission that the chain flies at the end; 0 for the mission loaded before the start.
     ///
-    /// Absent without uploads. All SIRs of the report refer to this mission.
+    /// Absent if no mission was uploaded. All SIRs of the report refer to this mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Error message, if the run failed.
@@ -75,7 +75,7 @@ pub struct ChainReport {
     /// than the tolerance.
     ///
     /// In a random field the leader computes an upper bound on the SIR. If this bound is higher than `target`, the
-    /// optimum is unknown, and the value is false. Absent without a random field or a bound.
+    /// optimum is unknown, and the value is false. Absent if there is no random field or no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
     /// Linear SIR of the chain before the first round of Algorithm 2, and after each round. In a round of this
@@ -136,7 +136,7 @@ pub struct ChainReport {
     /// Relays that are not in the chain at the end, with their last positions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<LostReport>,
-    /// Final positions of drones with simulated autopilots; empty without them.
+    /// Final positions of drones with simulated autopilots; empty if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drones: Vec<DroneReport>,
     /// Log of the run. It is empty if nothing happened except that relays accepted positions.
@@ -459,7 +459,7 @@ pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     })
 }
 
-/// Returns the version of the newest mission that any relay adopted; 0 without such a mission.
+/// Returns the version of the newest mission that any relay adopted; 0 if there is none.
 fn adopted(outcome: &Outcome) -> u16 {
     let versions = outcome.moments.iter().map(|moment| match moment.what {
         TimelineEvent::Adopted(version) => version,

@@ -46,7 +46,7 @@ pub struct RelayReport {
     /// Absent if it is unknown, or if the mission requires no SIR from Rx to Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back: Option<f64>,
-    /// Version of the relay's mission; 0 for the mission loaded before the start. Absent without uploads.
+    /// Version of the relay's mission; 0 for the mission loaded before the start. Absent if no mission was uploaded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
 }
@@ -176,7 +176,7 @@ pub struct WorstBack {
 impl WorstBack {
     /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
     ///
-    /// `None` if the mission requires no SIR from Rx to Tx, or without hops.
+    /// `None` if the mission requires no SIR from Rx to Tx, or if there are no hops.
     pub fn of(mission: &Mission, there: &[f64], back: &[f64]) -> Option<Self> {
         let reverse = f64::from(mission.config().reverse);
         if reverse > 0.0 {
@@ -188,7 +188,8 @@ impl WorstBack {
 
     /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
     ///
-    /// `reverse` is the SIR that hops to Tx need, as a fraction of the SIR that hops to Rx need. `None` without hops.
+    /// `reverse` is the SIR that hops to Tx need, as a fraction of the SIR that hops to Rx need. `None` if there are no
+    /// hops.
     pub fn with(reverse: f64, there: &[f64], back: &[f64]) -> Option<Self> {
         let worst = |sirs: &[f64]| sirs.iter().copied().reduce(f64::min);
         let (worst_there, worst_back) = (worst(there)?, worst(back)?);

@@ -396,7 +396,7 @@ pub struct RecoveryReport {
     pub lost: Vec<u16>,
     /// Relays in this view (membership of the chain) that were not in the previous view, by number from 1.
     pub back: Vec<u16>,
-    /// Version of an uploaded mission that the chain first flies in this view. Absent without such a mission.
+    /// Version of an uploaded mission that the chain first flies in this view. Absent if there is no such mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Time when the upload of the mission `version` began, s; absent without an upload.

@@ -344,8 +344,8 @@ struct Member {
     record: Option<ViewRecord>,
     /// Last setpoint that [`Chain::check`] found within the limits, so that it is not checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of all setpoints since the relay last had none. With a guard, a setpoint may be
-    /// outside of the geofence only within this range.
+    /// Smallest and largest coordinates of all setpoints since the relay last had none. If the relay has a guard, a
+    /// setpoint may be outside of the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -399,7 +399,7 @@ pub struct Chain {
 struct Start {
     /// Number of the relay that starts, from 1.
     index: u16,
-    /// Number of this start of the relay, from 1. With signed frames it is also the epoch.
+    /// Number of this start of the relay, from 1. If frames are signed, this number is also the epoch.
     number: u32,
     seed: u32,
     now: Instant,
@@ -451,7 +451,7 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults, whose positions are the reference for the statistics.
+    /// `run` simulates a fault-free chain, whose positions are the reference for the statistics.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;

@@ -298,7 +298,7 @@ pub struct Period {
     pub state: ChainState,
     /// Data rates at the agreed positions by the planner's formula, bit/s: to Rx, then back to Tx.
     ///
-    /// Empty without an agreement; the second is absent if data goes only to Rx.
+    /// Empty if there is no agreement. The second value is absent if data goes only to Rx.
     pub promised_bps: Vec<f64>,
 }
 

@@ -106,10 +106,10 @@ pub struct Setup {
     pub partitions: Vec<Partition>,
     /// True if relays sign frames, with a key drawn from the seed. The epoch counts the starts of a relay.
     pub auth: bool,
-    /// Uploads of missions during the run. Without `auth` no upload takes place, because uploads must be signed.
+    /// Uploads of missions during the run. If `auth` is false, no upload takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
-    /// Ends of the chain whose ground stations request reports from the relays, each with its start. Without `auth` no
-    /// station requests reports.
+    /// Ends of the chain whose ground stations request reports from the relays, each with its start. If `auth` is
+    /// false, no station requests reports.
     pub watches: Vec<(Side, Instant)>,
     /// Numbers, from 1, of relays that lose an uploaded mission at a reboot.
     pub forgetful: Vec<u16>,
@@ -257,7 +257,7 @@ impl Setup {
         })
     }
 
-    /// Returns the network key and the epoch of a relay at its `start`-th start. `None` without `auth`.
+    /// Returns the network key and the epoch of a relay at its `start`-th start. `None` if `auth` is false.
     pub fn proof(&self, start: u32) -> Option<Auth> {
         self.secret().map(|secret| Auth {
             key: Key::new(secret),

@@ -31,8 +31,8 @@ pub struct TrueInterference {
     pub ends_during: [Instant; 2],
     /// True if Tx and Rx measure the interference, too.
     ///
-    /// With a network key they send the results by radio. Without one, only the measurement at Rx arrives, by a wire
-    /// to the last relay.
+    /// If there is a network key, they send the results by radio. Otherwise only the measurement at Rx arrives, by a
+    /// wire to the last relay.
     pub ends: bool,
     /// Time of the last measurement, which ends the run.
     pub until: Instant,

@@ -31,7 +31,7 @@ pub struct Watch {
 impl Watch {
     /// Starts the statistics of a run with the relays' states `seen`.
     ///
-    /// `run` simulates a chain without faults, whose positions are the reference.
+    /// `run` simulates a fault-free chain, whose positions are the reference.
     pub fn new(seen: Vec<ObservedState>, run: Run) -> Self {
         Self {
             last_setpoints: vec![None; seen.len()],
@@ -348,7 +348,7 @@ impl Optima {
         }
     }
 
-    /// Returns true if `places` are the positions that the relays `nodes` (from 1) reach without faults.
+    /// Returns true if `places` are the positions that the relays `nodes` (from 1) reach in a fault-free run.
     ///
     /// `version` is the version of their mission. False if a position is missing.
     pub fn is_met(
@@ -410,7 +410,7 @@ pub fn places_of(outcome: &Outcome) -> Places {
     (outcome.ending == Ending::Settled).then(|| places.collect())?
 }
 
-/// Returns the positions in which a chain of only the relays `nodes` (from 1) settles without faults.
+/// Returns the positions in which a chain of only the relays `nodes` (from 1) settles in a fault-free run.
 ///
 /// `version` is the version of the mission that they fly.
 pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {

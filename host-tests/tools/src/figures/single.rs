@@ -215,7 +215,7 @@ fn gains(
 
 /// Returns the quantity that `reading` averages, for four positions of the relay at one altitude.
 ///
-/// The positions are the best one, a random one, the best one without interference, and the middle.
+/// The positions are the best one, a random one, the one that ignores the interference, and the middle.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
     let linear = [
         f64::from(row.sir_linear),
@@ -239,7 +239,7 @@ fn four(row: &Row, reading: Reading) -> [f64; 4] {
 
 /// Averages the gains in `rows`, the altitudes of one pair of powers, as `reading` states.
 ///
-/// `None` without rows.
+/// `None` if there are no rows.
 fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     let first = rows.first()?;
     let percent = |best: f64, under: f64| 100.0 * (best / under - 1.0);

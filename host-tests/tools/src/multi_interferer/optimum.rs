@@ -41,8 +41,8 @@ impl Chain {
 /// The powers of the relays may differ. If the minimum separation restricts the chain, the result is the best of the
 /// chains that keep it. Without a minimum separation, two relays may have the same position.
 ///
-/// `None` without relays or interferers, if altitudes differ, if the relays do not fit between Tx and Rx, and if no
-/// chain has an SIR above zero (an interferer at Rx).
+/// `None` if there are no relays or no interferers, if altitudes differ, if the relays do not fit between Tx and Rx,
+/// and if no chain has an SIR above zero (an interferer at Rx).
 ///
 /// Tested to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
 /// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in
@@ -79,8 +79,8 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
 
 /// Returns the SIR of the best chain at `altitude_m` that keeps the minimum separation, linear.
 ///
-/// `tolerance` is relative. `None` without relays or interferers, if the relays do not fit between Tx and Rx, and if no
-/// chain has an SIR above 0.
+/// `tolerance` is relative. `None` if there are no relays or no interferers, if the relays do not fit between Tx and
+/// Rx, and if no chain has an SIR above 0.
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)

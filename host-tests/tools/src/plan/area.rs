@@ -267,8 +267,8 @@ pub(super) fn range(area: &NoFly) -> String {
 
 /// Returns the reason why relays cannot be at the positions `chain`; `None` if they can.
 ///
-/// If `is_free` is true, relays choose their altitudes in flight, except relays with an altitude in the scenario. With
-/// `allow_crossing`, a path between neighbours through a no-fly area is no reason.
+/// If `is_free` is true, relays choose their altitudes in flight, except relays with an altitude in the scenario. If
+/// `allow_crossing` is true, a path between neighbours through a no-fly area is not a reason.
 pub fn problem(
     scenario: &Scenario,
     chain: &[Placement],

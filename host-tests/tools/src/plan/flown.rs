@@ -22,8 +22,8 @@ pub struct Flown {
     pub best_sir: f64,
     /// Data rates divided by the bandwidth, at the relays' positions and at the best ones found, bit/s/Hz.
     ///
-    /// `None` unless the slots are fitted (as long as each hop needs). With fitted slots these rates decide, not the
-    /// SIRs.
+    /// `None` unless the slots are fitted (as long as each hop needs). If the slots are fitted, the plan is judged by
+    /// these rates, not by the SIRs.
     pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,

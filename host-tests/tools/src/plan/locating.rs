@@ -49,7 +49,7 @@ pub struct Search {
     pub placed_s: Option<f64>,
     /// Distance of the last estimate from the interferer, or from its mirror image about the line Tx-Rx, m.
     ///
-    /// Absent without an estimate.
+    /// Absent if there is no estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Standard deviation of the location by the Cramer-Rao bound, m; absent if it is infinite.
@@ -81,7 +81,7 @@ pub struct Locating {
 impl Locating {
     /// Creates the report of `plan`, and sets the errors in `cells`.
     ///
-    /// `None` without `[listen]`, and unless there is a single interferer, with an area.
+    /// `None` if the scenario has no `[listen]`, or does not have exactly one interferer, with an area.
     ///
     /// # Errors
     /// A text that says why the flight cannot be simulated.

@@ -250,8 +250,8 @@ impl Candidates {
 
     /// Returns the chain for the hypothetical interferer if it suffices, else the best chain found.
     ///
-    /// With a `target` the SIR suffices if it is at least `target`. Without one it suffices if it is at most 1 % below
-    /// the SIR of the best chain against all interferers.
+    /// If there is a `target`, the chain suffices if its SIR is at least `target`. Otherwise it suffices if its SIR is
+    /// at most 1 % below that of the best chain against all interferers.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, value)| *value);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.value);

@@ -54,7 +54,7 @@ const AROUND: i32 = 2;
 pub struct OverTerrain {
     /// SIR of the worst hop with terrain at the positions that ignore the terrain, dB.
     ///
-    /// Absent without such positions.
+    /// Absent if there are no such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
     /// SIR of the plan minus the SIR at the positions that ignore the terrain, dB.

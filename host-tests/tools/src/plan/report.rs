@@ -42,12 +42,12 @@ pub struct HypotheticalReport {
     pub kept: bool,
     /// Loss of SIR at the positions for the hypothetical interferer, relative to the plan's SIR.
     ///
-    /// 0 if the plan has these positions. With fitted slots it is the loss of data rate.
+    /// 0 if the plan has these positions. If the slots are fitted, it is the loss of data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
     /// SIR of the plan divided by the SIR at the positions for the hypothetical interferer, minus 1.
     ///
-    /// With fitted slots it is the same for the data rates.
+    /// If the slots are fitted, it is the same ratio of the data rates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
     /// True if the data rate decides which positions are better, because the time slots are fitted.
@@ -70,8 +70,8 @@ pub struct RateReport {
     pub hop_rate_bps: Option<Rate>,
     /// Number of time slots that the hops share.
     ///
-    /// On one frequency, each hop has a slot for each direction of data. With a frequency for each hop, all hops share
-    /// one slot for each direction.
+    /// On one frequency, each hop has a slot for each direction of data. If each hop has its own frequency, there is
+    /// one slot for each direction of data, in which all hops send.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
     /// Time slot of each hop and direction; empty unless `link.access` is `fitted`.
@@ -681,7 +681,7 @@ pub struct NoiseReport {
 impl NoiseReport {
     /// Returns the noise of a scenario with its parameters.
     ///
-    /// `None` without noise, or if the scenario gives the noise power itself.
+    /// `None` if there is no noise, or if the scenario gives the noise power itself.
     pub fn of(noise: &Noise) -> Option<Self> {
         let power_w = noise.receiver_w();
         let is_made = noise.power_dbm.is_none() && power_w > 0.0;

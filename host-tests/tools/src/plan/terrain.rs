@@ -22,7 +22,7 @@ pub const POSITION_ERROR_M: f64 = 1.0;
 /// Elevation model of a scenario.
 #[expect(missing_debug_implementations, reason = "millions of heights")]
 pub struct Elevation {
-    /// Terrain of the scenario. With `--dem`, its files are those of the option.
+    /// Terrain of the scenario. If the option `--dem` is given, the files are those of the option.
     pub spec: TerrainSpec,
     terrain: Terrain,
     /// Position error of the relays, m. Obstacles within this distance count as below the relay.

@@ -203,7 +203,7 @@ pub struct Flight {
     pub loss_db: Option<f64>,
     /// Largest distance of a relay from its position in the plan for the terrain, m.
     ///
-    /// Absent without such a plan.
+    /// Absent if there is no such plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Positions of the relays.
@@ -486,7 +486,7 @@ const NOWHERE: &str = "the other relays find no positions";
 
 /// Returns a warning for each relay whose loss leads a remaining relay into a no-fly area.
 ///
-/// The flight is simulated without terrain. There are no warnings without no-fly areas.
+/// The simulated flight ignores the terrain. There are no warnings if there are no no-fly areas.
 ///
 /// # Errors
 /// [`NoPlan`]: the simulated relays do not agree on positions.

@@ -195,7 +195,7 @@ fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Returns the two t, m, of the first hop's extrema on an edge, without noise.
+/// Returns the two t, m, of the first hop's extrema on an edge, if there is no noise.
 ///
 /// t is the coordinate that varies along the edge.
 fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
@@ -328,8 +328,8 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
 
 /// Returns the position in the plane y = `y_m` at which the curves of constant SIR of both hops touch.
 ///
-/// `None` without noise, or if the position is not between Tx and Rx or not within the altitudes `band`. Work: 40
-/// bisection steps.
+/// `None` if there is no noise, or if the position is not between Tx and Rx or not within the altitudes `band`. Work:
+/// 40 bisection steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,

@@ -363,8 +363,8 @@ pub struct Guide {
     pub c2: f32,
     /// Ratio C_3: above it, the first hop has a higher SIR than the second even where its SIR is minimal.
     ///
-    /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, for example with an interferer at X
-    /// <= 0. With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
+    /// This minimum is between Tx and Rx, or beyond Rx. `None` if there is no minimum, for example for an interferer at
+    /// X <= 0. With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
     pub c3: Option<f32>,
 }
 

@@ -20,7 +20,7 @@ pub(super) const JUDGED: f32 = 4e-6;
 /// better chains ends if a chain reaches the bound within this tolerance.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Margin, in ln(SIR), of the first limit on a rising target above the upper bound of all chains.
+/// Difference in ln(SIR) of the first limit on the target and the upper bound of all chains.
 ///
 /// The search then checks if the chain reaches the bound; if so, the search ends.
 const PROBED: f32 = 3e-4;

@@ -22,7 +22,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 
     /// Computes the policies (moves) of the relays in `segment`. Returns the value function of the last relay before
-    /// the segment, which is at `before`.
+    /// the segment; `before` is the position of that relay.
     ///
     /// `None` if a hop cannot meet the target. Bounded by ten relays.
     pub(super) fn recall(

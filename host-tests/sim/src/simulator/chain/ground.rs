@@ -353,7 +353,8 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// Sends one frame of the attacker to a living relay. Without a frame to replay, the attacker tries again later.
+    /// Sends one frame of the attacker to a living relay. If there is no frame to replay, the attacker tries again
+    /// later.
     pub(super) fn send_attack(&mut self, kind: AttackKind) {
         let now = self.now;
         let Some(mut attacker) = self.attacker.take() else {

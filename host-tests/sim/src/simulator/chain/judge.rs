@@ -36,7 +36,7 @@ impl ChangedRelays {
 impl Chain {
     /// Starts the statistics of the run.
     ///
-    /// `run` simulates a chain without faults, whose positions are the reference for the statistics.
+    /// `run` simulates a fault-free chain, whose positions are the reference for the statistics.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
@@ -103,7 +103,7 @@ impl Chain {
         }
     }
 
-    /// Returns true if the chain is available: it has the positions that it would reach without faults.
+    /// Returns true if the chain is available: at the positions that it would reach in a fault-free run.
     ///
     /// At least one of the longest chains that the living relays can form must be at its positions. If these chains are
     /// too small for a quorum, their relays have no positions, and the result is false.
