@@ -348,7 +348,7 @@ impl Optima {
         }
     }
 
-    /// Returns true if `places` are the positions that the relays `nodes` (from 1) reach in a fault-free run.
+    /// Returns true if `places` are the positions that a fault-free run of the relays `nodes` reaches.
     ///
     /// `version` is the version of their mission. False if a position is missing.
     pub fn is_met(
@@ -410,7 +410,7 @@ pub fn places_of(outcome: &Outcome) -> Places {
     (outcome.ending == Ending::Settled).then(|| places.collect())?
 }
 
-/// Returns the positions in which a chain of only the relays `nodes` (from 1) settles in a fault-free run.
+/// Returns the positions in which a fault-free chain of only the relays `nodes` (from 1) settles.
 ///
 /// `version` is the version of the mission that they fly.
 pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {
