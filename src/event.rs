@@ -62,8 +62,8 @@ pub enum Event {
     ///
     /// Raised after three such handshakes in a row; a handshake with the right key starts the count again. An operator
     /// should give both nodes the same key. An attacker without the key can raise this event with three forged
-    /// handshakes in a row, but not with one forged frame. If the node is received at the same time, this is an attack
-    /// and the node is fine.
+    /// handshakes in a row, but not with one forged frame. If messages of the node are received at the same time, this
+    /// is an attack, and the node has the right key.
     KeyMismatch {
         /// Index of the node that does not sign with this relay's key.
         node: u16,
@@ -96,7 +96,7 @@ pub enum Event {
     LeaseLapsed,
     /// A new view was refused because too few relays are reachable for a quorum. The relays of this part of the chain
     /// hold their positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or
-    /// land the drones of this part.
+    /// land the drones of this part of the chain.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
@@ -117,8 +117,8 @@ pub enum Event {
     /// A node's measurements do not fit those of all other nodes; they are ignored until they fit.
     ///
     /// An operator should check the receiver of this node. Only the leader raises this event for the transmitter and
-    /// the receiver. A relay that measures nothing at all raises it itself, and no other node does. With four relays or
-    /// fewer the faulty relay cannot be identified
+    /// the receiver. A relay that measures nothing at all raises this event about itself, and no other node does. With
+    /// four relays or fewer the faulty relay cannot be identified
     /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
@@ -130,12 +130,12 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The remaining relays have closed the gap, and
     /// this relay's drone may fly away.
     MayLeave,
-    /// The drone's remaining time of flight is unknown. Raised only with a reserve (`Relay::set_reserve`).
+    /// The drone's remaining time of flight is unknown. Raised only if a reserve is set (`Relay::set_reserve`).
     ///
-    /// Raised if a value of `Relay::handle_endurance` was invalid, if none came for 10 s, or if none is known while the
-    /// relay controls the drone. The relay then counts down from the last value that agreed with the value before it,
-    /// or else from the last value. If there was no valid value, the relay does not leave the chain by itself. Raised
-    /// at most once a minute while the time is unknown.
+    /// Raised if a value of `Relay::handle_endurance` was invalid, if no value came for 10 s, or if no value is known
+    /// while the relay controls the drone. The relay then counts down from the last value that agreed with the value
+    /// before it, or else from the last value. If there was no valid value, the relay does not leave the chain by
+    /// itself. Raised at most once a minute while the time is unknown.
     EnduranceUnknown,
     /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while
     /// this is the case.

@@ -777,8 +777,8 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or the last hop that makes it half as long as an inner hop. In the best chain all
-/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
+/// Factor on the gain of an outer hop (first or last) that makes that hop half as long as an inner one. In the best
+/// chain all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -837,7 +837,7 @@ const FAR_AWAY: f64 = 1e-14;
 
 /// Returns the gains for an unknown interferer, with which the best chain has hops of equal length.
 ///
-/// They are the gain of the first hop, the gain per watt of an inner hop, and the gain per watt of the last hop.
+/// The result is the gain of the first hop, the gain per watt of an inner hop, and the gain per watt of the last hop.
 /// `power_w` is the transmit power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;

@@ -58,7 +58,7 @@ impl Outlook {
 
     /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near`, m^2, is the squared
     /// minimum distance from the interferer minus the squared actual distance. `slope` and `by_target` are the
-    /// derivatives of `near` by the position and by ln(target SIR).
+    /// derivatives of `near` by the relay's position and by ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
