@@ -125,7 +125,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// If some relays have to stop before their farthest x, the function also checks that they can.
+/// If some relays have to stop before their farthest x, the function also checks that they can stop there.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.

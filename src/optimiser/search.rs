@@ -99,7 +99,8 @@ pub struct Search {
 }
 
 impl Search {
-    /// Creates a search by the leader of `mission` with the profile `leader`. The other relays can have other profiles.
+    /// Creates a search by the leader of `mission` with the profile `leader`. The remaining relays can have different
+    /// profiles.
     ///
     /// # Errors
     /// [`Infeasible`] if a relay above the receiver gives the receiver an SIR of 0, because the interferer is

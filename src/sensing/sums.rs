@@ -142,8 +142,8 @@ pub const SUMS: usize = 18;
 /// The sums for each position: w a b for every two of the four terms a and b, w a v for each term, w v^2, the
 /// position's share, its number of measurements, and its share times its age in seconds. The share is 1 for a new
 /// position and fades. The weight w is 2 (v / e)^(1/2) / (v^2 + e^2), with the measured v and the expected value e of
-/// v. w is 1 / e^2 if v equals e. Errors that are equal in decibels have equal weights, and no position outweighs all
-/// other positions together.
+/// v. w is 1 / e^2 if v equals e. Errors that are equal in decibels have equal weights, and no position dominates the
+/// sums.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sums {

@@ -441,10 +441,10 @@ const END_HALVINGS: u8 = 24;
 /// Returns the maximum SIR of the first hop, times the factor [`LITTLE`]. `room` has the allowed lateral offsets and
 /// altitudes.
 ///
-/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are the
-/// squared distances from Tx to the interferer along that direction and perpendicular to it; h is the altitude, and nu
-/// the noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
-/// which falls with t. So with noise there is one optimum, closer to Tx.
+/// The best position is on the side of Tx opposite the interferer, t times as far from Tx as the interferer. U and B
+/// are the squared distances from Tx to the interferer along that direction and perpendicular to it; h is the altitude,
+/// and nu the noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t
+/// s^2, which falls with t. So with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
