@@ -320,8 +320,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. If both parts have a relay that needs to leave, the more urgent
-    /// one counts. If both have one that is ready to join, the one with the lower number counts.
+    /// Merges the requests of two parts of the chain. Of two departures the more urgent one counts, of two spares the
+    /// one with the lower number.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
