@@ -8,7 +8,7 @@ use core::f64::consts::PI;
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Kind of path loss between drones and the ground.
+/// Kind of path loss between a drone and a station on the ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
@@ -30,7 +30,7 @@ pub struct Channel {
     mu_los: f64,
     /// Path-loss factor from the interferer to the ground receiver, without line of sight, 1/m^2.
     mu_nlos: f64,
-    /// Path-loss factor between a drone and the ground, 1/m^2; the same in both directions.
+    /// Path-loss factor between a drone and a station on the ground, 1/m^2; the same up and down.
     eta: f64,
 }
 
@@ -159,7 +159,7 @@ impl Channel {
         self.mu_nlos
     }
 
-    /// Path-loss factor between a drone and the ground, 1/m^2.
+    /// Path-loss factor between a drone and a station on the ground, 1/m^2.
     pub const fn eta(&self) -> f64 {
         self.eta
     }

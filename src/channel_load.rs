@@ -27,16 +27,16 @@ const FRAMES: u64 = 8;
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3/20. The rest is for other messages,
-/// retransmissions, and waits for a free channel.
+/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3/20. The rest is for all further
+/// messages, for retransmissions, and for waits until the channel is free.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
 /// Maximum number of relays in range for which a transmission is assumed to find the channel free.
 ///
-/// Every further nine relays add one frame time to each transmission. Nine relays are this relay and four on either
-/// side.
+/// Every further nine relays add one frame time to each transmission. Nine relays are this relay, four toward Tx and
+/// four toward Rx.
 const NEAR: u16 = 9;
 
 /// Maximum time assumed for one transmission, including the wait for the channel, in frame times.
@@ -62,7 +62,7 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the bits that the channel must be able to carry in one `probe_after`, times 1e6.
+    /// Returns 1e6 times the number of bits that the channel must be able to carry in one `probe_after`.
     ///
     /// The result divided by `probe_after` in microseconds is the minimum data rate in bit/s.
     const fn needed(self) -> u64 {
@@ -173,7 +173,7 @@ impl ChannelLoad {
     }
 }
 
-/// Error of [`ChannelLoad::carried`]: the channel is overloaded. The fields say how to avoid this.
+/// Error of [`ChannelLoad::carried`]: the channel is overloaded. The fields give limits with which it would not be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
@@ -185,7 +185,7 @@ pub struct ChannelFull {
     ///
     /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times this value.
     pub least_probe_after: Duration,
-    /// Maximum number of relays in range that this channel carries without a longer `probe_after`.
+    /// Maximum number of relays in range that this channel carries with the given `probe_after`.
     pub most_in_range: u16,
 }
 

@@ -25,21 +25,21 @@ pub enum Event {
     Infeasible,
     /// The neighbour at `side` is lost.
     ///
-    /// It has answered nothing for at least `Settings::dead_after` (15 s by default), and has left at least 16 requests
-    /// unanswered. On a channel that loses frames this takes longer, at most eight times `dead_after`. With two links
-    /// the relay keeps sending heartbeat requests to the neighbour; on a shared channel it searches for another node at
-    /// that side. An operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space around its
-    /// last position.
+    /// The neighbour has answered nothing for at least `Settings::dead_after` (15 s by default), and has left at least
+    /// 16 requests unanswered. On a channel that loses frames the event is raised later, after at most eight times
+    /// `dead_after`. On separate links the relay keeps sending heartbeat requests to the neighbour; on a shared channel
+    /// it searches for a different node at that side. An operator looks for that drone. Once it has landed,
+    /// `Relay::clear_lost` frees the space around its last position.
     NeighbourLost {
-        /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
+        /// Side of this relay, toward Tx or toward Rx, on which the lost neighbour is.
         side: Side,
         /// Index of the lost neighbour in the chain, 1 to N.
         node: u16,
     },
-    /// A lost neighbour is received again, or another node has replaced it. In the second case `node` differs from
-    /// the node that was reported lost.
+    /// A lost neighbour is received again, or a new neighbour has replaced it. In the second case `node` is not the
+    /// node that was reported lost.
     NeighbourBack {
-        /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
+        /// Side of this relay, toward Tx or toward Rx, on which the neighbour is.
         side: Side,
         /// Index of the neighbour that is received now.
         node: u16,
@@ -51,20 +51,21 @@ pub enum Event {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node's mission differs from this relay's, or this relay cannot obtain it. The node's messages are ignored.
-    /// An operator loads the same mission into both nodes before take-off. Raised once a minute for each node.
+    /// A node's mission differs from this relay's mission, or is one that this relay cannot obtain. The node's messages
+    /// are ignored. An operator loads the same mission into both nodes before take-off. Raised once a minute for each
+    /// node.
     MissionMismatch {
-        /// Index of the node with the other mission.
+        /// Index of the node whose mission is not this relay's mission.
         node: u16,
     },
-    /// A node signs its handshakes with another key than this relay.
+    /// A node signs its handshakes with a key that is not this relay's key.
     ///
     /// Raised after three such handshakes in a row; a handshake with the right key starts the count again. An operator
     /// should give both nodes the same key. An attacker without the key can raise this event with three forged
-    /// handshakes in a row, but not with one forged frame. If the node is received at the same time, this is an attack
-    /// and the node is fine.
+    /// handshakes in a row, but not with one forged frame. If messages of the node are received at the same time, this
+    /// is an attack, and the node has the right key.
     KeyMismatch {
-        /// Index of the node that signs with another key.
+        /// Index of the node that does not sign with this relay's key.
         node: u16,
     },
     /// Five handshakes in a row from a node have an old epoch (start counter). The node's frames are rejected.
@@ -79,9 +80,10 @@ pub enum Event {
         node: u16,
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
-    /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of the
-    /// two nodes and gives it the right index. Not raised again before the other node has been silent for twice
-    /// `dead_after`. With signed frames, an attacker without the key can raise this event, but cannot do more.
+    /// `Relay::is_passive`). If it is a neighbour's index, frames with this index are received at both ports. An
+    /// operator lands one of the two nodes and corrects its index. Not raised again before the duplicate has been
+    /// silent for twice `dead_after`. With signed frames, an attacker without the key can raise this event, but cannot
+    /// do more.
     DuplicateIndex {
         /// Index that two nodes use.
         node: u16,
@@ -89,12 +91,12 @@ pub enum Event {
     /// The chain has agreed on its members (a new view). `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired. The relay keeps its setpoint and requests a new view, because other relays may no longer
-    /// use the last agreement. Not raised again before a view is agreed on.
+    /// The lease has expired. The relay keeps its setpoint and requests a new view, because the members no longer have
+    /// to keep to the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
-    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land the
-    /// drones of this part.
+    /// A new view was refused because too few relays are reachable for a quorum. The relays of this part of the chain
+    /// hold their positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or
+    /// land the drones of this part of the chain.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
@@ -115,8 +117,8 @@ pub enum Event {
     /// A node's measurements do not fit those of all other nodes; they are ignored until they fit.
     ///
     /// An operator should check the receiver of this node. Only the leader raises this event for the transmitter and
-    /// the receiver. A relay that measures nothing at all raises it itself, and no other node does. With four relays or
-    /// fewer the faulty relay cannot be identified
+    /// the receiver. A relay that measures nothing at all raises this event about itself, and no other node does. With
+    /// four relays or fewer the faulty relay cannot be identified
     /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
@@ -125,24 +127,25 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
-    /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap, and
+    /// The relay is outside of the chain, as requested by `Relay::leave`. The remaining relays have closed the gap, and
     /// this relay's drone may fly away.
     MayLeave,
-    /// The drone's remaining time of flight is unknown. Raised only with a reserve (`Relay::set_reserve`).
+    /// The drone's remaining time of flight is unknown. Raised only if a reserve is set (`Relay::set_reserve`).
     ///
-    /// Raised if a value of `Relay::handle_endurance` was invalid, if none came for 10 s, or if none is known while the
-    /// relay controls the drone. The relay then counts down from the last value that agreed with the value before it,
-    /// or else from the last value. Without any valid value the relay does not leave the chain by itself. Raised at
-    /// most once a minute while the time is unknown.
+    /// Raised if a value of `Relay::handle_endurance` was invalid, if no value came for 10 s, or if no value is known
+    /// while the relay controls the drone. The relay then counts down from the last value that agreed with the value
+    /// before it, or else from the last value. If there was no valid value, the relay does not leave the chain by
+    /// itself. Raised at most once a minute while the time is unknown.
     EnduranceUnknown,
-    /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while that lasts.
+    /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while
+    /// this is the case.
     AtReserve,
-    /// A node outside of the chain was told by this relay that the node's drone may fly away.
+    /// A message from this relay has told a node outside of the chain that the node's drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event
     /// may be repeated.
     MayLeaveTold {
-        /// Side of this relay on which the node is: toward Tx or toward Rx.
+        /// Side of this relay, toward Tx or toward Rx, on which the node is.
         side: Side,
         /// Index of the node whose drone is permitted to leave.
         node: u16,
@@ -192,9 +195,9 @@ pub(crate) enum NodeEvent {
     Mission,
     Key,
     Epoch,
-    /// Two nodes use the same index. The event's side has no meaning if it is this relay's index.
+    /// Two nodes use the same index. If that is this relay's index, the side of the event has no meaning.
     Index,
-    /// The measurements of the node do not fit those of the other nodes.
+    /// The measurements of the node do not fit those of all other nodes.
     Sensor,
     #[cfg(feature = "departures")]
     MayLeaveTold,
@@ -234,8 +237,8 @@ impl NodeEvent {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     events: u32,
-    /// Raised events that concern a node on one side. Entry 0 is for the upstream side, entry 1 for the downstream
-    /// side. Bit i stands for `NodeEvent::ALL[i]`.
+    /// Raised events that concern a node. Entry 0 is for nodes toward Tx, entry 1 for nodes toward Rx. Bit i stands for
+    /// `NodeEvent::ALL[i]`.
     kinds: [u16; 2],
     nodes: [[u16; NodeEvent::ALL.len()]; 2],
 }
@@ -255,7 +258,8 @@ impl Pending {
         self.events |= Self::bit(event);
     }
 
-    /// Raises an event about `node` at `side`. It replaces an event of the same kind and side about another node.
+    /// Raises an event about `node` at `side`. It replaces an event of the same kind on the same side, even if that is
+    /// about a different node.
     pub(crate) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         let at = usize::from(side == Side::Downstream);
         let (Some(bits), Some(nodes)) = (self.kinds.get_mut(at), self.nodes.get_mut(at)) else {

@@ -107,8 +107,8 @@ impl Sites {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance differs from the distance between its Tx and Rx positions. A mission without such
-    /// positions is compared with the positions that the relay was configured with (`Settings::sited`).
+    /// The mission's distance differs from the distance between its Tx and Rx positions. If the mission has no such
+    /// positions, its distance is compared with that between the relay's configured positions (`Settings::sited`).
     Distance,
     /// The mission's Tx and Rx positions are less than 10 m or more than 100 km apart.
     Sites,
@@ -119,7 +119,7 @@ pub enum LineError {
     Lateral,
     /// The mission's distance from transmitter to receiver exceeds the relay's own geofence.
     Length,
-    /// The mission has fitted slots (`fitted_gap` above 0), which this relay cannot fly.
+    /// The mission has fitted slots (`fitted_gap` above 0), which this relay's settings do not allow.
     ///
     /// Fitted slots need the method `Joint`, no `Settings::listen`, and a known interferer.
     Slots,

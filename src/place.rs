@@ -2,7 +2,8 @@
 
 /// Position in the air.
 ///
-/// Frame: x along the ground from the transmitter toward the receiver, y to the right of x as seen from above, h up.
+/// Frame: x along the ground from the transmitter toward the receiver, y to the right for an observer who looks along
+/// x, h up.
 ///
 /// ```
 /// use uav_relay::Placement;
@@ -16,14 +17,14 @@
 pub struct Placement {
     /// Distance from the transmitter along the ground, m: 0 to D, the distance from Tx to Rx.
     pub x_m: f32,
-    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
+    /// Lateral offset from the line Tx to Rx, m. Positive to the right for an observer at Tx who looks to Rx.
     pub y_m: f32,
     /// Height of the position above the ground, m.
     pub altitude_m: f32,
 }
 
 impl Placement {
-    /// Creates the position right above the line from transmitter to receiver: the lateral offset is 0.
+    /// Creates a position vertically above the line from Tx to Rx: the lateral offset is 0.
     pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
         CrossSection::on_line(altitude_m).at(x_m)
     }
@@ -38,18 +39,18 @@ impl Placement {
     }
 }
 
-/// Lateral offset and altitude of a relay: its position without x.
+/// Lateral offset and altitude of a relay: its position except for x.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
-    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
+    /// Lateral offset from the line Tx to Rx, m. Positive to the right for an observer at Tx who looks to Rx.
     pub y_m: f32,
     /// Height of the relay above the ground, m.
     pub altitude_m: f32,
 }
 
 impl CrossSection {
-    /// Creates the cross-section right above the line from Tx to Rx: the lateral offset is 0.
+    /// Creates the cross-section vertically above the line from Tx to Rx: the lateral offset is 0.
     pub const fn on_line(altitude_m: f32) -> Self {
         Self {
             y_m: 0.0,
@@ -72,7 +73,7 @@ impl CrossSection {
     }
 }
 
-/// Lateral offset, altitude and transmit power of a relay. Its x is not given but computed.
+/// Lateral offset, altitude and transmit power of a relay. It does not include x, which is computed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {
@@ -85,7 +86,7 @@ pub struct Station {
 /// Behaviour of a relay while it can reach too few relays for a quorum of the chain.
 ///
 /// [`Leave`](Self::Leave) moves the drone out of the way of the relays that have a quorum. Set the same value on all
-/// relays. Relays that leave the line then keep their order and distances.
+/// relays, so that the relays that leave the line keep their order and distances.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
@@ -95,9 +96,9 @@ pub enum WithoutQuorum {
     /// Leave the line from Tx to Rx: fly sideways (along y) and upward from the last agreed position. A guard keeps the
     /// drone in its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
-        /// Lateral offset that is added to the last position that the chain has agreed on, m: -1e4 to 1e4.
+        /// Lateral distance from the last position that the chain has agreed on, m: -1e4 to 1e4.
         y_m: f32,
-        /// Height that is added to the last position that the chain has agreed on, m: 0 to 1e4.
+        /// Height above the last position that the chain has agreed on, m: 0 to 1e4.
         up_m: f32,
     },
 }

@@ -11,8 +11,8 @@ use crate::place::Placement;
 
 /// Direction and distance of a position relative to a relay.
 ///
-/// Frame: x toward the receiver, y to the right of x as seen from above, h up. So the frame is left-handed, as in the
-/// paper, and azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
+/// Frame: x toward the receiver, y to the right for an observer who looks along x, h up. So the frame is left-handed,
+/// as in the paper, and azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {
@@ -21,7 +21,7 @@ pub struct Bearing {
     pub azimuth_rad: f32,
     /// Elevation: angle of the direction above the horizon, rad, within -pi/2 to pi/2.
     pub elevation_rad: f32,
-    /// Straight distance to the position, m, above 0; relative error below 3e-7.
+    /// Distance to the position in a straight line, m, above 0; relative error below 3e-7.
     pub distance_m: f32,
 }
 

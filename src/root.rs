@@ -34,7 +34,7 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// It searches the value up to which `holds` returns true. `holds` must be true at `low` and false at `high`.
+/// It searches the value up to which `holds` returns true. `holds` must return true for `low` and false for `high`.
 pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bool) -> (f32, f32) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {

@@ -55,19 +55,19 @@ pub enum Method {
     /// Optimise x, y and altitude jointly, within the mission's ranges. This method is for up to 100 relays, and not
     /// for a mission that gives the interference as a distribution along x.
     Joint,
-    /// Optimise x by the paper's Algorithm 1, then move one relay after the other by Algorithm 2. This method is not
-    /// for a mission that gives the interference as a distribution along x.
+    /// Optimise x by the paper's Algorithm 1, then move the relays in turn by Algorithm 2. This method is not for a
+    /// mission that gives the interference as a distribution along x.
     Adjust(Adjust),
 }
 
-/// Parameters of the paper's Algorithm 2, which moves one relay after the other to a better position.
+/// Parameters of the paper's Algorithm 2, which moves the relays in turn to better positions.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
-    /// Maximum number of rounds, the paper's `Iter_max`. In a round every relay may move once. Algorithm 2 ends after a
-    /// round in which no relay moves.
+    /// Maximum number of rounds, the paper's `Iter_max`. In a round each relay moves at most once. Algorithm 2 ends
+    /// after a round in which no relay moves.
     pub rounds: u16,
-    /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
+    /// Maximum change of a relay's altitude in one move, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
     /// Search method for a relay's better position.
     pub local: Local,
@@ -84,7 +84,7 @@ impl Default for Adjust {
     }
 }
 
-/// Settings of a relay that measures the interference itself. They are for a mission that gives the interference as a
+/// Settings of a relay that measures the interference itself. Only for a mission that gives the interference as a
 /// distribution along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -113,7 +113,7 @@ pub struct Measure {
 pub struct Settings {
     /// Altitude and power of this relay; `None` for the values that the mission gives.
     pub profile: Option<Profile>,
-    /// True to keep this relay's altitude fixed while the method optimises other relays' altitudes.
+    /// True to keep this relay's altitude fixed, although the method optimises altitudes.
     pub hold_altitude: bool,
     /// Method that the leader runs; the other relays follow. The leader is relay 1, or relay N if the mission gives
     /// the interference as a distribution along x.
@@ -121,48 +121,48 @@ pub struct Settings {
     /// Measurement of the interference by this relay; `None` for no measurement. The measured interference replaces
     /// the distribution along x that the mission gives. Use `None` if the mission gives no such distribution.
     pub measure: Option<Measure>,
-    /// Estimation of an unknown interferer from measurements; `None` for no estimation. It must be `None` if the
-    /// mission gives the interference as a distribution along x. Set it on all relays of a chain, or on none.
+    /// Estimation of an unknown interferer from measurements; `None` for no estimation. Use `None` if the mission gives
+    /// the interference as a distribution along x. Set it on all relays of a chain, or on none.
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one round
-    /// trip of messages along the chain is enough. It has an effect only with the bracketed schedule.
+    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is correct, one
+    /// round trip of messages along the chain is enough. This setting has an effect only with the bracketed schedule.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
-    /// Key and epoch for signing frames. With a key the relay accepts signed frames only; without one, it accepts
+    /// Key and epoch for signing frames. A relay with a key accepts only signed frames; a relay without a key accepts
     /// frames from any sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
     /// Maximum time from `poll_transmit` at one relay to `poll_transmit` at the next relay; above 0. The time is for
     /// a message of 100 bytes (a sweep), and includes the computation. For longer messages it is scaled up.
     pub hop_time: Duration,
-    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. It sends 16 requests until
-    /// `dead_after`, and more on a channel that loses frames.
+    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. This relay sends 16 requests
+    /// until `dead_after`, and more on a channel that loses frames.
     pub probe_after: Duration,
     /// Minimum silence after which a neighbour counts as lost, and minimum duration of a lease. Above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the previous view's
+    /// True if a part of a split chain needs a quorum to continue. A quorum is more than half of the previous view's
     /// members, or exactly half including the view's proposer. Without this rule, the parts of a split chain would
     /// interfere with each other.
     pub quorum: bool,
     /// Behaviour of the relay while too few relays are reachable for a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With a guard the
-    /// firmware has to report the drone's position: `Relay::handle_position`.
+    /// Guard that keeps the drones separated while they move, and inside a geofence; `None` for no guard. With a guard
+    /// the firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
     /// Duration of the motion to a newly agreed position (feature `departures`). The setpoint moves to the new
     /// position in 32 steps, at most 1.5 times as fast as on average. All relays of a chain begin together. With 0 it
     /// moves in one step, at once.
     ///
-    /// If all drones arrive together, no hop is worse on the way than before or after
-    /// ([`docs::batteries`](crate::docs::batteries)). The longest way is about a spacing of the chain. Choose the
-    /// duration so that drones fly it at their usual speed or slower. Use the same value for all relays of a chain, at
-    /// most four times `dead_after`.
+    /// If all drones arrive together, no hop is worse during the move than before or after it
+    /// ([`docs::batteries`](crate::docs::batteries)). The longest move is about the distance between two neighbours.
+    /// Choose the duration so that drones fly it at their usual speed or slower. Use the same value for all relays of a
+    /// chain, at most four times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
     /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
-    /// its drone, which still waits at its place. At an end of the chain they come as close as a few metres.
+    /// its drone, which still waits at its position. At an end of the chain they come within a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
@@ -268,7 +268,7 @@ impl Settings {
             .with_probe_after(probe_after)
     }
 
-    /// Returns the settings with another `probe_after`, and with three times this value as `dead_after`.
+    /// Returns the settings with this `probe_after`, and with three times this value as `dead_after`.
     #[must_use]
     pub const fn with_probe_after(self, probe_after: Duration) -> Self {
         Self {
@@ -278,7 +278,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with at least the minimum `hop_time` for a channel of `baud` bit/s and `load`.
+    /// Returns the settings with a `hop_time` long enough for `load` and a channel of `baud` bit/s.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {
@@ -304,8 +304,8 @@ pub enum SetupError {
     /// not [`Method::Align`]. Or the method is [`Method::Joint`], and the chain has more than 100 relays. Or the method
     /// needs a feature that the crate was built without.
     Method,
-    /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
-    /// traffic in both directions this method needs a known interferer.
+    /// The method Joint is used with `listen`, although the mission has data from Rx to Tx (`reverse`). For data in
+    /// both directions this method needs a known interferer.
     Reverse,
     /// The mission has fitted slots (`fitted_gap` above 0), but the method is not Joint. Or `listen` is set, or the
     /// interferer is unknown.

@@ -16,9 +16,9 @@ use crate::root::{PowerRatio, bisected, sqrt};
 
 /// Returns the inverse interference at `at`, the factor in a hop's SIR that depends on interference.
 ///
-/// The SIR of a hop to a receiver at `at` is the sender's gain times this factor, divided by the squared length of
-/// the hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise
-/// s / (1 + nu s). In an interference field the factor is Upsilon(x) / `Upsilon_max`, with noise.
+/// The SIR of a hop to a receiver at `at` is the sender's gain times this factor, divided by the squared length of the
+/// hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, or with receiver noise s / (1 +
+/// nu s). In an interference field the factor is Upsilon(x) / `Upsilon_max`, where Upsilon includes the noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -98,8 +98,8 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. This is `SIR_{N+1}` of the paper:
-/// [`Mission::receiver_gain`] divided by the squared distance from the relay to Rx.
+/// Returns the SIR at the ground receiver of the signal from a relay of `power_w` watts at `from`. This is `SIR_{N+1}`
+/// of the paper: [`Mission::receiver_gain`] divided by the squared distance from the relay to Rx.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
@@ -112,8 +112,7 @@ pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K divided by the squared length of the
-/// hop.
+/// Returns the factor K of a hop from a relay to Tx, m^2. The SIR at Tx is K divided by the hop's squared length.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"
@@ -164,13 +163,13 @@ fn first_hop_peak(mission: &Mission, interferer: &Interferer, altitude_m: f32) -
 
 /// Returns the largest SIR of the first hop to a relay at `altitude_m`, for any x from Tx to Rx.
 ///
-/// For an interferer at X >= 0, the SIR is largest at x = 0, right above Tx (the paper's Lemma 2 and `gamma_0`):
-/// anywhere else s / (x^2 + h^2) is smaller. Where s is larger, 1 / (1 + nu s) is smaller too; where s is smaller,
-/// s / (1 + nu s) is smaller and x^2 + h^2 is larger. For X < 0 the SIR has a single maximum along x; if that is
-/// beyond Rx, the SIR is largest at Rx.
+/// For an interferer at X >= 0, the SIR is largest at x = 0, vertically above Tx (the paper's Lemma 2 and `gamma_0`):
+/// anywhere else s / (x^2 + h^2) is smaller. Where s is larger, 1 / (1 + nu s) is smaller too; where s is smaller, s /
+/// (1 + nu s) is smaller and x^2 + h^2 is larger. For X < 0 the SIR has a single maximum along x; if that is beyond Rx,
+/// the SIR is largest at Rx.
 ///
 /// If the mission gives the interference as a distribution along x, the result is an upper bound. It is the SIR of a
-/// relay right above Tx with the largest Upsilon of all x. The result is larger at lower altitudes.
+/// relay vertically above Tx with the largest Upsilon of all x. The result is larger at lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

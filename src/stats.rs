@@ -8,10 +8,10 @@ pub struct Stats {
     pub sent: u32,
     /// Retransmissions of view proposals and of messages along the chain, because there was no reply.
     pub repeats: u32,
-    /// View proposals and messages along the chain that this relay has started as the leader.
+    /// View proposals and passes along the chain that this relay has started as the leader.
     pub passes_begun: u32,
-    /// Messages received from a neighbour with all values in range. Some are also counted by another counter, for
-    /// example as stale.
+    /// Messages received from a neighbour with all values in range. Some of them are also counted below, for example as
+    /// stale.
     pub received: u32,
     /// Received duplicates of view proposals and of messages along the chain. This relay has repeated its replies.
     pub repeated: u32,
@@ -19,39 +19,38 @@ pub struct Stats {
     pub overheard: u32,
     /// Received frames that are longer than the format allows.
     pub oversized: u32,
-    /// Received frames that were cut short, so that their end is missing.
+    /// Received frames whose end is missing.
     pub truncated: u32,
     /// Received frames with a wrong CRC.
     pub crc: u32,
-    /// Received intact frames of another version of the frame format.
+    /// Received intact frames of a frame format version that this relay does not know.
     pub version: u32,
     /// Received handshake frames with the right authentication tag. Handshakes only establish sessions.
     pub handshakes: u32,
-    /// Intact frames without an authentication tag, received by a relay with a key. A relay without a key counts
-    /// mission offers here, because it accepts offers only with a key.
+    /// Received intact frames without an authentication tag, if this relay has a key. If it has no key: received
+    /// mission offers, because offers are accepted only with a key.
     pub unsigned: u32,
-    /// Intact frames with a wrong authentication tag: sent without the key, altered, or of another epoch.
+    /// Intact frames with a wrong authentication tag: sent without the key, altered, or of an old epoch.
     pub forged: u32,
     /// Frames with the right authentication tag that were received before, or are too old to check.
     pub replayed: u32,
     /// Received intact frames without a valid message, or with a value out of range.
     pub malformed: u32,
-    /// Received intact frames of another network.
+    /// Received intact frames of a network that is not this relay's network.
     pub foreign: u32,
-    /// Received intact frames from a node that is no neighbour. On a point-to-point link also frames for another
-    /// node.
+    /// Received intact frames from a node that is no neighbour. On a point-to-point link also frames that are not
+    /// addressed to this relay.
     pub misaddressed: u32,
-    /// Received messages along the chain from the next relay, or replies from the previous relay. Both come from the
-    /// wrong neighbour.
+    /// Received messages of passes from the wrong neighbour. A pass must come from the previous relay of the pass, and
+    /// a reply from the next one.
     pub misdirected: u32,
-    /// Ignored messages of another mission, and offers of a mission that this relay refuses. The events are
+    /// Ignored messages of a mission that is not this relay's, and offers of a mission that it refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Ignored messages with the digest of another view or mission. Counted are view changes and messages along the
-    /// chain.
+    /// Ignored view changes and pass messages whose digest is not that of this relay's view and mission.
     pub view: u32,
-    /// Views (chain memberships) that this relay has accepted.
+    /// Views (agreements on the chain's members) that this relay has accepted.
     pub views: u32,
     /// Ignored outdated messages, for example of a view change that has ended. Mission offers that this relay has not
     /// requested by a recent hello also count here.

@@ -25,26 +25,27 @@ pub struct Report {
     pub agreed: Option<Placement>,
     /// Phase of the relay in the agreement on positions.
     pub phase: Phase,
-    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)). The lease permits the relay to rely
-    /// on the agreed positions.
+    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)). While it has the lease, it may rely on
+    /// the agreed positions.
     pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
-    /// Reasons why the drone holds its position: because of the neighbour toward Tx, and toward Rx.
+    /// Reasons why the drone holds its position. The first is about the neighbour toward Tx, the second about the one
+    /// toward Rx.
     pub hold_reasons: [Option<HoldReason>; 2],
     /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],
-    /// True for a neighbour that the relay does not receive now: toward Tx, and toward Rx.
+    /// Flags for the neighbours toward Tx and toward Rx: true if the relay does not receive it now.
     pub silent: [bool; 2],
-    /// True if the relay has received another node with its own number within three times `dead_after`.
+    /// True if the relay has received a second node with its number within three times `dead_after`.
     pub is_duplicated: bool,
-    /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
+    /// True while the drone's autopilot flies to a position that is not the setpoint sent by the relay.
     pub refuses_setpoint: bool,
-    /// Number of the nearest node that the relay ignores because of another mission; `None` for none.
+    /// Number of the nearest node that the relay ignores because their missions differ; `None` for none.
     pub other_mission: Option<u16>,
-    /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
+    /// Number of the nearest node whose last handshakes do not have the relay's key; `None` for none.
     pub other_key: Option<u16>,
-    /// Interference last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
+    /// Interference power last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
     pub version: u16,
@@ -72,7 +73,7 @@ const CONTROLS: [State; 6] = [
     State::Engaged,
 ];
 
-/// Control state of a drone that the relay controls, but whose autopilot flies to another target.
+/// Number of a control state. The relay controls the drone, but the autopilot does not fly to the setpoint.
 pub(crate) const REFUSED: u16 = 6;
 
 /// Hold reasons in the order of their numbers in a report, from 1.
@@ -88,7 +89,7 @@ const HOLDS: [HoldReason; 7] = [
 
 /// Returns the number of the node whose messages the relay of this entry ignores; `None` for none.
 ///
-/// `first` is 1 if another mission is the reason, and 9 if another key is the reason.
+/// `first` is 1 to ask for a different mission as the reason, and 9 for a different key.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),

@@ -103,8 +103,8 @@ const DISORDER: Duration = Duration::from_millis(100);
 /// could take internal time to its maximum, and no timer would expire any more.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
-/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time can step in
-/// either direction.
+/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time can step
+/// forward or backward.
 ///
 /// | caller's time | internal time |
 /// | --- | --- |
@@ -158,7 +158,7 @@ impl MonotonicClock {
     }
 }
 
-/// Converts `at` from one clock to another: returns `to` + (`at` - `from`). The first clock shows `from` when the
+/// Converts `at` from a first clock to a second clock: `to` + (`at` - `from`). The first clock shows `from` when the
 /// second shows `to`.
 fn shifted(at: Instant, from: Instant, to: Instant) -> Instant {
     let back = from.since(at).as_micros();

@@ -4,8 +4,8 @@ use crate::mission::MAX_RELAYS;
 
 /// Identifier of a view, which is an agreement on the members of the chain.
 ///
-/// It consists of a number and of the node that proposed the view, so that no two nodes propose the same view. Views
-/// are ordered by number, then by proposer.
+/// It consists of a number and of the node that proposed the view. So no two nodes propose views with the same
+/// identifier. Views are ordered by number, then by proposer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
@@ -63,8 +63,8 @@ impl ViewId {
         }
     }
 
-    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. It differs for views with
-    /// the same number and different proposers, and for thousands of consecutive views.
+    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. Views with the same
+    /// number and different proposers have different values, and so have thousands of consecutive views.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -199,7 +199,9 @@ impl FenceViolation {
         let [least, most] = self.range_m;
         let beyond_m = |it: &Move| {
             let at = (self.coordinate)(&it.after);
-            (least - at).max(at - most)
+            // A longer line exceeds the upper limit of x.
+            let below_m = if *name == "x" { f32::MIN } else { least - at };
+            below_m.max(at - most)
         };
         let who = format!("{what}; every relay with a drone refuses it");
         let moves = moves.unwrap_or_default().iter().rev();

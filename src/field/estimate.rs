@@ -48,9 +48,9 @@ const LEAST_MEAN: f32 = 1e-6;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimator {
-    /// Sum of the squares of the accepted samples I / `I_max`, in units of 2^-62.
+    /// Sum of the squares of the accepted samples I / `I_max`; 2^62 stands for 1.
     squares: u128,
-    /// Sum of the accepted samples I / `I_max`, in units of 2^-31.
+    /// Sum of the accepted samples I / `I_max`; 2^31 stands for 1.
     sum: u64,
     /// Maximum interference power `I_max`, W; 0 if the argument of [`Estimator::new`] was out of range.
     i_max_w: f32,
@@ -72,7 +72,7 @@ pub struct Estimate {
     /// estimate with a probability of about 95 %.
     ///
     /// This assumes that the interference has a Beta distribution. The standard error covers the limited number of
-    /// samples only: with another distribution the estimate can be wrong by more.
+    /// samples only: with a different distribution the estimate can be wrong by more.
     pub standard_error_per_w: f32,
     /// Number of accepted samples on which the estimate is based.
     pub samples: u32,
@@ -81,8 +81,8 @@ pub struct Estimate {
 impl Estimator {
     /// Minimum number of accepted samples for an estimate.
     ///
-    /// An estimate from so few samples can still be bad. With 100 samples and a true alpha below 1.5, most estimates
-    /// exist only because alpha is overestimated by chance. The estimated Upsilon is then too low.
+    /// An estimate from 100 samples can still be bad. With 100 samples and a true shape parameter alpha below 1.5, most
+    /// estimates exist only because alpha is overestimated by chance. The estimated Upsilon is then too low.
     pub const MIN_SAMPLES: u32 = 100;
 
     /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.

@@ -44,8 +44,8 @@ error_texts!(FieldError {
     Upsilon => "upsilon_per_w (mean of 1 / interference power, in 1/W) must be within 1e-9 to 1e32",
 });
 
-/// Interference field: a checked table of Upsilon = E[1/I] along x. Upsilon is linear between two points, and constant
-/// beyond the ends of the table.
+/// Interference field: a checked table of Upsilon = E[1/I] along x. Upsilon is linear between two adjacent points, and
+/// constant beyond the ends of the table.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Field {
@@ -132,12 +132,12 @@ impl Field {
         self.points
     }
 
-    /// Returns the smallest Upsilon = E[1/I] of the table, 1/W: the worst interference.
+    /// Returns the smallest Upsilon = E[1/I] of the table, 1/W: that of the strongest interference.
     pub const fn smallest(&self) -> f32 {
         self.smallest
     }
 
-    /// Returns the largest Upsilon = E[1/I] of the table, 1/W: the weakest interference.
+    /// Returns the largest Upsilon = E[1/I] of the table, 1/W: that of the weakest interference.
     pub const fn largest(&self) -> f32 {
         self.largest
     }
@@ -157,8 +157,8 @@ impl Field {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// Returns the two points around `x_m`. If `x_m` is at a point or beyond the table, the first result is this point
-    /// or the end point, and the second is `None`.
+    /// Returns the two points around `x_m`. If `x_m` is the x of a point, the result is this point and `None`. If `x_m`
+    /// is beyond the table, it is the end point and `None`.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {

@@ -128,7 +128,7 @@ impl ReachableInterval {
     }
 }
 
-/// Time between two reports of a drone's position from which it does not count as hovering between them.
+/// Time between two position reports from which the drone does not count as hovering.
 const HOVER_REPORTS: Duration = Duration::from_millis(2_500);
 
 /// Number of seconds after which a setpoint that has not moved counts as held up.
@@ -272,8 +272,7 @@ impl Own {
         self.set_setpoint(place, now);
     }
 
-    /// Handles a position report before the first setpoint, measured at time `at`: the drone hovers while its reports
-    /// agree.
+    /// Handles a position report of time `at` before the first setpoint: equal positions are a hover.
     pub(super) fn report_hover(&mut self, at: Instant, place: Placement) {
         let stays = self.is_at(place, self.last_arrival);
         if !(stays && at < self.reachable.reported_at + HOVER_REPORTS) {
@@ -283,7 +282,7 @@ impl Own {
         self.reachable.reported_at = at;
     }
 
-    /// Returns true if the drone has hovered for the [`lag`](GuardConfig::lag) when its first setpoint is due.
+    /// Returns true if the drone has hovered for the [`lag`](GuardConfig::lag) before its first setpoint.
     pub(super) fn hovers(&self, now: Instant) -> bool {
         let ReachableInterval {
             reported_at,

@@ -17,8 +17,8 @@ pub(crate) mod tests;
 /// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x between two relays, as a fraction of the distance from Tx to Rx. It is at least two steps of an
-/// f32 even near Rx, so that no two positions are equal.
+/// Smallest step in x between two relays, as a fraction of the distance from Tx to Rx. It is at least twice the spacing
+/// of f32 numbers near Rx, so that no two positions are equal.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step in x, as a fraction of the distance from Tx to Rx.
@@ -26,8 +26,8 @@ pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 /// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
 ///
-/// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to its right as seen from above,
-/// altitude is height above the ground.
+/// Frame: x runs along the ground from the transmitter (0) to the receiver (`distance_m`), y to the right for an
+/// observer who looks along x, altitude is height above the ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionConfig {
@@ -39,7 +39,7 @@ pub struct MissionConfig {
     pub min_separation_m: f32,
     /// Transmit power of the ground transmitter, W: 1e-6 to 1e6.
     pub tx_power_w: f32,
-    /// Altitude and power of every relay without a profile of its own.
+    /// Altitude and power of every relay whose settings have no profile.
     pub common: Profile,
     /// Range of altitudes, m, for methods that choose altitudes. Within 0.1 to 1e5; includes `common.altitude_m`.
     pub band: Band,
@@ -47,25 +47,26 @@ pub struct MissionConfig {
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: one transmitter, at a known or unknown position, or a field. A field is a distribution
-    /// along x.
+    /// Interference on the hops: of one transmitter at a known or unknown position, or a field. A field gives the
+    /// distribution of the interference for every x.
     pub interference: Interference,
-    /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
-    /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
+    /// Noise power at the input of every receiver, W: 0 to 1. At most 1e12 times the interferer's power received at 1
+    /// m. 0 is the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
     /// SIR that a hop needs from Rx to Tx, divided by the SIR that it needs from Tx to Rx: r, 0 to 1.
     ///
-    /// 0 means one direction only, as in the paper. Above 0, the lower of two SIRs counts once the interference is
-    /// known: the forward SIR, and the backward SIR divided by r.
+    /// 0 means data from Tx to Rx only, as in the paper. Above 0, once the interference is known, a hop counts by the
+    /// lower of two values: the SIR toward Rx, and the SIR toward Tx divided by r.
     pub reverse: f32,
-    /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
+    /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. It has no effect if `reverse` is
     /// 0.
     pub rx_power_w: f32,
-    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, each time slot is as long as its
-    /// hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is
-    /// log2(1 + SINR / gap).
+    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. If the gap is not 0, each time slot is as long as
+    /// its hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is log2(1 + SINR /
+    /// gap).
     pub fitted_gap: f32,
-    /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
+    /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain is accepted if its SIR is within this fraction of the best
+    /// SIR.
     pub tolerance: f32,
 }
 
@@ -115,8 +116,8 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays with `min_separation_m` between them need more than `distance_m`. This includes a rounding margin
-    /// of 5e-7 `distance_m` per relay.
+    /// Together, relays with `min_separation_m` between neighbours need more than `distance_m`. This includes a
+    /// rounding margin of 5e-7 `distance_m` per relay.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -134,7 +135,7 @@ pub enum MissionError {
     Noise,
     /// `noise_w` is above 0, and the crate was built without its feature `noise`.
     NoiseFeature,
-    /// The interference is a field (a distribution along x), but the crate was built without `field`.
+    /// `interference` is `Interference::Field`, and the crate was built without its feature `field`.
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
@@ -178,9 +179,9 @@ error_texts!(MissionError {
 pub struct Interferer {
     /// Transmit power of the interferer, W.
     pub power_w: f32,
-    /// Position of the interferer along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
+    /// x of the interferer, m: 0 is the x of Tx, D the x of Rx. May be below 0 or above D.
     pub x_m: f32,
-    /// Lateral offset of the interferer, m: positive to the right of the line Tx to Rx, else negative.
+    /// Lateral offset of the interferer, m. Positive to the right for an observer at Tx who looks to Rx.
     pub y_m: f32,
 }
 
@@ -205,7 +206,7 @@ impl Interferer {
 pub enum Interference {
     /// Single interfering transmitter at a known position.
     Source(Interferer),
-    /// Interference field: only the distribution of the interference along x is known.
+    /// Interference field: for every x, the distribution of the interference is known; its sources are not.
     Field(Field),
     /// Single interfering transmitter at an unknown position. Relays spread evenly until they know it
     /// ([`crate::Settings::listen`]).
@@ -231,7 +232,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// Lateral range that allows y = 0 only. As in the paper, relays stay in the vertical plane through Tx and Rx.
+    /// Lateral range that allows y = 0 only. Relays then stay in the vertical plane through Tx and Rx, as in the paper.
     pub const NONE: Self = Self::at(0.0);
 
     /// Returns the range that contains only the value `at_m`, m.
@@ -290,7 +291,7 @@ impl Profile {
         within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
     }
 
-    /// Returns this altitude and power as those of a relay right above the line Tx to Rx (y = 0).
+    /// Returns this altitude and power as those of a relay vertically above the line Tx to Rx (y = 0).
     pub const fn on_line(self) -> Station {
         Station {
             cross_section: CrossSection::on_line(self.altitude_m),
@@ -309,10 +310,10 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a drone-to-drone hop per watt of the sender's power, in the formula of the hop's SIR. With one
-    /// interferer the gain is eta / (`mu_los` `p_MSI`), 1/W. eta and `mu_los` are the path-loss factors drone to
-    /// ground and drone to drone, and `p_MSI` is the interferer's power. In an interference field the gain is
-    /// `Upsilon_max` / `mu_los`, m^2/W.
+    /// Gain of a drone-to-drone hop per watt of the sender's power; see [`Mission::relay_gain`]. With one interferer
+    /// the gain is eta / (`mu_los` `p_MSI`), 1/W. eta and `mu_los` are the path-loss factors drone to ground and drone
+    /// to drone, and `p_MSI` is the interferer's power. In an interference field the gain is `Upsilon_max` / `mu_los`,
+    /// m^2/W.
     pub(super) relay_gain_per_w: f64,
     /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's power,
     /// divided by the squared distance.
@@ -553,7 +554,7 @@ impl Mission {
         }
     }
 
-    /// Returns the interference field (distribution along x), or `None` for a single transmitter.
+    /// Returns the interference field (distribution for every x), or `None` for a single transmitter.
     pub const fn field(&self) -> Option<&Field> {
         match &self.config.interference {
             Interference::Field(field) if FIELD => Some(field),
@@ -579,8 +580,8 @@ impl Mission {
         if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
-    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. It is 0 for one
-    /// direction.
+    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. r is 0 for data
+    /// from Tx to Rx only.
     ///
     /// While the interferer is unknown r is 0, because relays then spread evenly. Without the feature `reverse` the
     /// function returns a constant, so that the compiler drops the code for two directions.
@@ -602,7 +603,7 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to N), or in an
+    /// Returns the order in which the relays compute their positions. The order is toward Rx (relay 1 to N), or in an
     /// interference field toward Tx (relay N to 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
@@ -612,8 +613,8 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, which computes its position first. It is 1, or N for a mission with an
-    /// interference field.
+    /// Returns the index of the leader, which computes its position first. The leader is relay 1, or relay N in a
+    /// mission with an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -630,7 +631,7 @@ impl Mission {
         }
     }
 
-    /// Returns the same mission with another number of relays.
+    /// Returns the same mission with `relays` relays.
     ///
     /// # Errors
     /// [`MissionError::Relays`] or [`MissionError::TooManyForDistance`].
@@ -655,7 +656,7 @@ impl Mission {
         self.tx_gain
     }
 
-    /// Returns the gain of a hop from a relay of `power_w` watts to another drone.
+    /// Returns the gain of a hop from a relay of `power_w` watts to a drone: a factor in the hop's SIR.
     ///
     /// The hop's SIR is this gain times the inverse interference ([`crate::sir::quiet`]), divided by the squared
     /// length. With one interferer the gain is (`p_u` / `p_MSI`) (eta / `mu_los`). `p_u` and `p_MSI` are the powers of
@@ -718,7 +719,7 @@ impl Mission {
     }
 
     /// Returns the farthest allowed x of relay `index`, m, with room for the separation of later relays. Later relays
-    /// are those whose positions are computed after this one.
+    /// are those whose positions are computed after the position of relay `index`.
     ///
     /// Farthest means toward Rx, or toward Tx with an interference field. `across_squared` is the largest squared
     /// distance, in y and altitude, between two neighbours among those later relays, m^2. It reduces their steps in x.
@@ -727,7 +728,7 @@ impl Mission {
     }
 
     /// Returns the farthest allowed x of relay `index`, m, without room for the separation of later relays. Later
-    /// relays are those whose positions are computed after this one.
+    /// relays are those whose positions are computed after the position of relay `index`.
     ///
     /// Farthest means toward Rx, or toward Tx with an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
@@ -757,7 +758,7 @@ impl Mission {
         self.config.distance_m - after * self.step_of(least)
     }
 
-    /// Returns the step in x, m, that keeps two relays at least `least` metres apart after rounding to f32.
+    /// Returns the step in x, m, that keeps two relays at least `least`, m, from each other after rounding.
     fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
         if least > 0.0 {
@@ -776,12 +777,12 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or last hop that makes this hop half as long as the others. In the best chain all
-/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
+/// Factor on the gain of an outer hop (first or last) that makes that hop half as long as an inner one. In the best
+/// chain all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// Returns the interferer if its position is known. `None` for an unknown interferer or an interference field.
+    /// Returns the interferer if its position is known. `None` for an unknown interferer and for an interference field.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -789,11 +790,11 @@ impl Mission {
         }
     }
 
-    /// Returns the mission with another `interference`.
+    /// Returns the mission with this `interference` instead of its own.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
     /// `halved` has a flag for the first hop and a flag for the last hop. A hop with a true flag becomes half as long
-    /// as the others.
+    /// as the inner hops.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -824,8 +825,8 @@ impl Mission {
     }
 }
 
-/// Substitute for an interferer at an unknown position. It is so far away that all receivers have the same
-/// interference, to 1e-7.
+/// Substitute for an interferer at an unknown position. This substitute is so far away that the interference at all
+/// receivers is equal to within 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,
@@ -836,8 +837,8 @@ const FAR_AWAY: f64 = 1e-14;
 
 /// Returns the gains for an unknown interferer, with which the best chain has hops of equal length.
 ///
-/// They are the gain of the first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the
-/// transmit power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
+/// The result is the gain of the first hop, the gain per watt of an inner hop, and the gain per watt of the last hop.
+/// `power_w` is the transmit power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

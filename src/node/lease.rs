@@ -109,7 +109,7 @@ struct Departures {
     leaver: (u16, Instant),
     /// Time of the agreement on positions in this view, as seen by the leader.
     settled_at: Instant,
-    /// Time at which the first renewal of this view turned at the last relay; `None` until it has completed here.
+    /// Time at which this view's first renewal turned at the last relay; `None` until it has completed.
     turned_at: Option<Instant>,
 }
 
@@ -286,10 +286,10 @@ impl Lease {
         }
     }
 
-    /// Returns the time at which the first renewal of this view turned at the last relay; `None` until it is known.
+    /// Returns the time at which this view's first renewal turned at the last relay; `None` if unknown.
     ///
     /// Each relay takes it as the middle between its forwarding of the renewal and its reception of the reply, so that
-    /// all relays know about the same time, without a common clock.
+    /// all relays know about the same time, without a common clock. `None` until it is known.
     pub(crate) fn turned_at(&self) -> Option<Instant> {
         self.departures.first()?.turned_at
     }

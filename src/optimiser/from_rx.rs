@@ -33,7 +33,7 @@ use crate::mission::{Interferer, Mission};
 use crate::place::Station;
 use crate::sir::{Sender, square};
 
-/// Hop from Rx to the last relay: the first hop of data from Rx to Tx.
+/// Hop from Rx to the last relay: the first hop of the data that flow from Rx to Tx.
 pub(super) struct FromRx {
     /// Hop from Rx in a mirrored coordinate frame: x is the distance from Rx.
     hop: Hop,
@@ -71,10 +71,10 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the SIR margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
+    /// Returns the margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
     ///
-    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. It is a continuous function
-    /// of `target`.
+    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. The margin is a continuous
+    /// function of `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -84,7 +84,7 @@ impl FromRx {
     }
 
     /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx well enough. `None` if there
-    /// is no such x. Call it only if the SIR from Rx misses `target` at `x_m`.
+    /// is no such x. The SIR from Rx must miss `target` at `x_m`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;

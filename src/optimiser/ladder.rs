@@ -11,7 +11,7 @@ use crate::root::sqrt;
 /// Number of target SIRs in a full ladder, the list of targets of one sweep along the chain.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps between targets in half of a full ladder, including the middle gap.
+/// Number of gaps above target 7 in a full ladder, the list of targets 0 to 15.
 const HALF: usize = TARGETS / 2;
 
 /// Ladder: rising list of target SIRs, linear, for one pass along the chain (a sweep). Encoded as one target and two
@@ -19,17 +19,17 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Eighth of the 16 targets, linear SIR: the lower of the two in the middle. If there is only one target, it is
-    /// this one.
+    /// Eighth of the 16 targets, linear SIR: the lower of the two middle targets. If the list has one target, that
+    /// target.
     anchor: f32,
     /// Code of the relative gap between the two middle targets: their difference divided by the lower one. The code is
     /// a float of 5 exponent and 3 mantissa bits. With code 0, `anchor` is the only target.
     gap: u8,
-    /// Code of the growth of the gaps from the middle of the list to its ends. Each gap is 1 + `growth` / 16 times its
-    /// neighbour toward the middle.
+    /// Code of the growth of the gaps from the middle of the list to its ends. Each gap is 1 + `growth` / 16 times the
+    /// next gap toward the middle.
     growth: u8,
-    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
-    /// stay short of that x to help the next relay on the pass.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stop before
+    /// that x to help the next relay on the pass.
     plain: bool,
 }
 
@@ -45,14 +45,14 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay takes the farthest
-    /// x that meets the target.
+    /// Returns a ladder with the same targets, for a plain pass if `plain` is true. In a plain pass every relay takes
+    /// the farthest x that meets the target.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In any other
-    /// pass a relay is allowed to stay short of this x to help the next relay.
+    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. Otherwise a
+    /// relay may stop before this x to help the next relay.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
@@ -75,8 +75,8 @@ impl Ladder {
         )
     }
 
-    /// Returns 16 targets (a ladder) that are dense around `centre` and span [`low`, `high`]. `centre` is in the
-    /// middle of a gap of the relative width `gap`; the gaps grow outward from there.
+    /// Returns 16 targets (a ladder) that are dense around `centre` and span [`low`, `high`]. `centre` is in the middle
+    /// of a gap; this gap is `gap` times its lower target wide. The gaps grow outward from it.
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
@@ -188,13 +188,14 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the relative gap between two targets for the byte `code`: (1 + m / 8) 2^(e - 25). m is the number in the low
-/// three bits of `code`, e the number in the other five bits.
+/// Returns the gap, divided by the lower target, for the byte `code`: (1 + m / 8) 2^(e - 25). m is the number in the
+/// low three bits of `code`, e the number in its high five bits.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }
 
-/// Returns the one-byte code, 1 to 254, of the relative gap nearest to `gap`.
+/// Returns the one-byte code, 1 to 254, whose gap is nearest to `gap`. A gap is relative: the difference of two
+/// targets, divided by the lower one.
 fn gap_code(gap: f32) -> u8 {
     let bits = gap.to_bits().saturating_sub(102 << 23);
     let rounded = bits.saturating_add(1 << 19) >> 20;

@@ -30,8 +30,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals of x on each side of the interferer, for data in both directions. The search evaluates
-/// both hops at the ends of the intervals.
+/// Number of equal intervals of x before the interferer, and beyond it, for data in both directions. The search
+/// evaluates both hops at the ends of the intervals.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -40,11 +40,11 @@ const ROUNDING: f32 = 3e-7;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Coarse-to-fine search over altitudes. It takes at most 1080 evaluations of both hops, 8730 with traffic in
-    /// both directions.
+    /// Coarse-to-fine search over altitudes. It evaluates both hops at most 1080 times; 8730 times for data in both
+    /// directions.
     #[default]
     Fine,
-    /// Search on the paper's grid of positions, with `columns` times `rows` evaluations of both hops.
+    /// Search on the paper's grid of positions. It evaluates both hops `columns` times `rows` times.
     Grid {
         /// Number of positions of the grid along x, including the positions of the neighbours, 2 to 255.
         columns: u8,
@@ -53,7 +53,7 @@ pub enum Local {
     },
 }
 
-/// Neighbour of a relay whose position is searched. It is the other end of one of the relay's two hops.
+/// Neighbour of a relay whose position is searched: the far end of one of the relay's two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
     /// Position of the neighbour.
@@ -64,7 +64,7 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Two hops of a relay at any position: from the node toward Tx, and to the node toward Rx.
+/// Two hops of a relay at any position: from the next node toward Tx, and to the next node toward Rx.
 ///
 /// l is the squared length of a hop, and q the inverse interference at the relay. For the hop from the node toward Tx
 /// the SIRs are A q / l, with the gain A, and backward `returned` / l. For the hop to the node toward Rx they are
@@ -77,7 +77,7 @@ pub struct Hops {
     /// Gain A of the hop from the node toward Tx. The hop's SIR is A times the inverse interference, divided by the
     /// squared length.
     gain: f32,
-    /// SIR at the node toward Rx that receives this relay, times the squared length of the hop, m^2.
+    /// SIR with which the next node toward Rx receives this relay, times the squared hop length, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
@@ -85,10 +85,11 @@ pub struct Hops {
     noise: f32,
 }
 
-/// Gains of both hops for data from Rx to Tx, divided by r; infinite for a mission without such data.
+/// Gains of both hops for data from Rx to Tx, divided by r. r is the required ratio of backward to forward SIR. The
+/// gains are infinite for a mission without data from Rx to Tx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// SIR at the node toward Tx that receives this relay, times the squared length of the hop, m^2.
+    /// SIR with which the next node toward Tx receives this relay, times the squared hop length, m^2.
     returned: f32,
     /// Gain A' of the backward hop from the node toward Rx to the relay.
     gain: f32,
@@ -166,7 +167,7 @@ impl Hops {
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
-    /// For traffic in both directions, each result is the smaller of two SIRs: the forward SIR, and the backward SIR
+    /// For data in both directions, each result is the smaller of two values: the forward SIR, and the backward SIR
     /// divided by r. r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
@@ -194,7 +195,7 @@ impl Hops {
         incoming.min(outgoing)
     }
 
-    /// Returns true if the hop from the relay at `at` has a lower SIR than the hop to this relay.
+    /// Returns true if the outgoing hop of the relay at `at` has a lower SIR than the incoming hop.
     fn is_out_worse(&self, at: Placement) -> bool {
         let (incoming, outgoing) = self.both(at);
         incoming > outgoing
@@ -228,14 +229,15 @@ pub struct LocalSearch {
     best_row: (f32, f32),
     /// Best position found so far; `None` if no position is better than the relay's current one.
     found: Option<Placement>,
-    /// Linear SIR of the worse hop at the best position found. Before that it is the SIR at the current position.
+    /// Linear SIR of the worse hop at the best position found; at the current position if none is found.
     best_sir: f32,
-    /// Number of evaluations at the current altitude. Counted only for data in both directions.
+    /// Number of evaluations at the current altitude. The count stays 0 in a mission with data in one direction.
     evaluations: u16,
 }
 
 impl LocalSearch {
-    /// Starts the search of a relay at `at` for the position with the largest SIR of its two hops, `hops`.
+    /// Starts the search for the position at which the worse of the relay's two hops, `hops`, is best. The relay is at
+    /// `at`.
     ///
     /// The search reaches up to `explore_m` metres above and below the present altitude. `band` is the lowest and the
     /// highest allowed altitude, m.
@@ -262,8 +264,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. One altitude
-    /// takes 24 evaluations, or 194 for traffic in both directions.
+    /// Continues the search by at most `budget` evaluations of both hops, plus those for one altitude. One altitude
+    /// takes 24 evaluations, or 194 for data in both directions.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -299,8 +301,8 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude in the range of the current round, m. `part` 0 is the lowest altitude, 1 the highest. The
-    /// result never exceeds the highest altitude, in spite of rounding.
+    /// Returns an altitude in the range of the current round, m. `part` is 0 for the lowest altitude, 1 for the
+    /// highest. Rounding never raises the result above the highest altitude.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -442,9 +444,9 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns the search of a relay between two neighbours 100 m apart. `altitude_m` is the relay's altitude, and
-    /// `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band` the allowed
-    /// altitudes, m.
+    /// Returns the search of a relay between two neighbours, which are 100 m from each other. `altitude_m` is the
+    /// relay's altitude, and `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band`
+    /// the allowed altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

@@ -39,28 +39,29 @@ use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum ratio of a hop's target SIR to its gain; with a larger ratio no hop is short enough. All numbers stay
-/// finite.
+/// Maximum ratio of a hop's target SIR to its gain. With a larger ratio no hop is short enough. The limit keeps all
+/// numbers finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
 const STEPS: u8 = 32;
 
-/// Maximum number of steps of a search by bisection, each of which at least halves the interval.
+/// Maximum number of steps of a search by bisection. Each step at least halves the interval.
 pub(super) const HALVINGS: u8 = 32;
 
 /// Number of Newton steps for the hop length at which the curvature of the margin g changes its sign. g is 0 or above
 /// where a hop with noise meets its target.
 const TURNS: u8 = 5;
 
-/// Rounding error of the margin of a hop with noise, relative to the required value. A target that is missed by at most
-/// this error counts as met.
+/// Rounding error of the margin of a hop with noise, as a fraction of the required value. A target that is missed by at
+/// most this error counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of the hop length below which the search for the maximum length ends.
 const CLOSE: f32 = 5e-7;
 
-/// Hop with receiver noise that has to meet one target SIR. Its methods compute the lengths along x at which it does.
+/// Hop with receiver noise that has to meet one target SIR. Its methods compute the lengths along x at which the target
+/// is met.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
     /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times the inverse interference, divided by
@@ -97,8 +98,8 @@ impl NoisyHop {
 
     /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error.
     ///
-    /// g, m^2, is at least 0 if the hop meets its target SIR. `d` is along x, m. It must be so short that the noise
-    /// alone does not make the hop miss the target.
+    /// g, m^2, is at least 0 if the hop meets its target SIR. `d` is along x, m, and so short that the noise alone does
+    /// not make the hop miss the target.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -166,7 +167,7 @@ impl NoisyHop {
     }
 
     /// Returns the largest hop length from `low` to `high`, m, that meets the target. `None` if there is none. The
-    /// margin g is 0 there; at lengths that meet the target it is 0 or above.
+    /// margin g is 0 at the result; at lengths that meet the target it is 0 or above.
     ///
     /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
@@ -191,8 +192,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 there; at
-    /// lengths that meet the target it is 0 or above.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 at the result;
+    /// at lengths that meet the target it is 0 or above.
     ///
     /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {

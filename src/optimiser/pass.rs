@@ -28,7 +28,7 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries to receive Rx well enough. Used only with data in both
+/// Maximum number of positions at which the last relay tries to receive Rx well enough. Used only for data in both
 /// directions.
 const HOLDS: u8 = 4;
 
@@ -43,12 +43,12 @@ pub struct Behind {
     /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
     /// Upsilon, the mean inverse interference power that the previous relay has measured, 1/W. `None` to use the
-    /// mission's interference field. Only passes toward Tx use it.
+    /// mission's interference field. Only passes toward Tx use this value.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a previous relay with this altitude and power, lateral offset 0, and no measurement.
+    /// Returns a previous relay with the altitude and power `profile`, on the line, without a measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -71,14 +71,14 @@ pub struct Link<'a> {
     /// Upsilon, the mean inverse interference power, measured by the relay, 1/W. `None` to use the mission's
     /// interference field.
     pub measured_per_w: Option<f32>,
-    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
-    /// stay short of that x to help the next relay on the pass.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stop before
+    /// that x to help the next relay on the pass.
     pub plain: bool,
-    /// Maximum x of the relay, m, which leaves the relays toward Rx room for their separation. Only the joint method
-    /// computes it; `None` with other methods. Not used in an interference field.
+    /// Maximum x of the relay, m, which leaves the relays toward Rx room for their separation. `None` unless the joint
+    /// method has computed it. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets there. `None` unless the
-    /// mission has fitted slots (time slots as long as each hop needs).
+    /// Fixed x of this relay, m. It is the relay's reach for every target that the hop to this x meets. `None` unless
+    /// the mission has fitted slots (time slots as long as each hop needs).
     pub fixed_m: Option<f32>,
 }
 
@@ -145,8 +145,8 @@ impl<'a> Link<'a> {
     }
 
     /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
-    /// computes 16 reaches. In an interference field it computes as many reaches as take 128 evaluations of the
-    /// field's points, but at least one.
+    /// computes 16 reaches. In an interference field it stops after 128 evaluations of field points, but computes at
+    /// least one reach.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -161,8 +161,9 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. Both
-    /// directions must meet it, and two relays must be in order and separated.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. The hop must
+    /// meet it in both directions of data, if there are two. If the previous node is a relay, both relays must be in
+    /// order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -226,13 +227,13 @@ impl<'a> Link<'a> {
 
     /// Returns the maximum x of the previous relay in a pass toward Tx, m.
     ///
-    /// Relays nearer to Rx need no separation in x: at different altitudes they can be above each other.
+    /// The relays between it and Rx need no separation in x: they can be above each other.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop that allows this relay, its sender, the smallest x. The hop's receiver is at x from `low` to
-    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop from this relay that meets `target` at the smallest x of this relay. The receiver is at an x
+    /// from `low` to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -255,10 +256,10 @@ impl<'a> Link<'a> {
 
     /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// `reach` is this relay's reach, and `from_m` the reach of the previous relay. `None` if Rx is out of reach from
-    /// everywhere. For a pass toward Rx the slack is `reach` plus the maximum length of the last hop, minus D. For a
-    /// pass toward Tx the slack is the maximum length of the first hop minus this relay's x; the x is chosen so that
-    /// the slack is largest.
+    /// `reach` is this relay's reach, and `from_m` the reach of the previous relay. `None` if the target cannot be met
+    /// at any position of this relay. For a pass toward Rx the slack is `reach` plus the maximum length of the last
+    /// hop, minus D. For a pass toward Tx the slack is the maximum length of the first hop minus this relay's x; the x
+    /// is chosen so that the slack is largest.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -307,8 +308,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m`, m, at which this relay receives the pass's previous relay. The previous
-    /// relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x, m, at which this relay receives the previous relay of the pass. It is at most `most_m`.
+    /// The previous relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -317,8 +318,8 @@ impl<'a> Link<'a> {
     }
 
     /// Returns the chain's slack and this last relay's x, m, for data in both directions. `hop` leads from Rx to this
-    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if its
-    /// SIR from Rx would be too low there.
+    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay's x is less than `reach` if its
+    /// SIR from Rx would be too low at `reach`.
     fn held(
         &self,
         hop: &FromRx,
@@ -351,9 +352,9 @@ impl<'a> Link<'a> {
 
     /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
     ///
-    /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
-    /// position. The search assumes that the possible positions of the previous relay are one interval, although this
-    /// interval can have gaps. Work: at most two reaches; in an interference field three for each of its points.
+    /// `from_m` is the farthest x of the previous relay. `None` if the previous relay has no such position. The search
+    /// assumes that the possible positions of the previous relay are one interval, although this interval can have
+    /// gaps. Work: at most two reaches; in an interference field three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -472,7 +473,7 @@ impl Verdict {
 }
 
 /// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
-/// is 0 or more. In a varying field, or with different altitudes, lower targets can be missed; they count all the same.
+/// is 0 or more. Lower targets that are missed, in a varying field or at different altitudes, count as well.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -520,7 +521,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
 
     /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
     ///
-    /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
+    /// Each item has the index of a relay, the reach of the previous relay of the pass, m, and the reach of this relay,
+    /// m.
     pub fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
         let mut reach = origin(self.mission);
         let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
@@ -531,8 +533,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. `index` is 0
-    /// for no relay: the result is then `Some` if all relays can take their reaches.
+    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. With `index` 0,
+    /// the result is `Some` if all relays can, whatever the number.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -561,8 +563,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. `index` is 0 for no
-    /// relay: the result is then `Some` if all relays can take their required positions.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. With `index` 0, the
+    /// result is `Some` if all relays can, whatever the number.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -587,9 +589,10 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
     /// x = `place`, m.
     ///
-    /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
-    /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
-    /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
+    /// `visit` gets the index of a relay, the x of this relay, and the index of the previous relay of the pass. It
+    /// returns the reach of the previous relay, m; if there is none, the x at which the pass starts. The result is the
+    /// x required before the first relay. It is `None` if some relay cannot take its required position, or if `visit`
+    /// returns `None`.
     pub fn settle(
         &self,
         place: f32,

@@ -20,8 +20,8 @@ pub struct Agreed {
     pub commit: u8,
     /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
-    /// Target SIR that no chain at these altitudes can meet, linear. `None` with the paper's fixed step, whose passes
-    /// do not try all chains, and for data in both directions.
+    /// Target SIR that no chain with the relays' altitudes can meet, linear. `None` with the paper's fixed step,
+    /// because its passes do not try all chains. `None` also for data in both directions.
     pub most: Option<f32>,
     /// Number of passes along the chain that the search took.
     pub sweeps: u32,
@@ -69,8 +69,8 @@ impl Planner {
     /// Computes at most `hops` hops of a pass along the chain; `Ok(Some(..))` once the chain is solved.
     ///
     /// For a hop it computes the farthest x of one relay for each of at most 16 targets. In an interference field a
-    /// call computes as many of these x as take 128 evaluations of the field's points, but at least one. `profile_of`
-    /// returns the profile of relay 1..=N, and must always return the same.
+    /// call stops after 128 evaluations of field points, but computes at least one of these x. `profile_of` returns the
+    /// profile of relay 1..=N, which must not change between calls.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left to try.
@@ -125,7 +125,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// If some relays have to stay short of their farthest position, their positions are checked, too.
+/// If some relays have to stop before their farthest x, the function also checks that they can stop there.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -162,7 +162,8 @@ pub fn solve(
 }
 
 impl Mission {
-    /// Returns the position that relay `index` computes without messages. All relays must have the mission's profile.
+    /// Returns the position that relay `index` computes without messages. Each relay must have the altitude and power
+    /// that the mission states.
     ///
     /// This position is, to the bit, the position on which relays agree by messages:
     /// `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`. `None` if no target can be met.

@@ -64,8 +64,8 @@ const ROUNDING: f32 = 4e-6;
 /// Maximum number of f32 steps that shorten a computed hop until it meets its target.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in an interference field, with a receiver at a known position. It gives the sender's x for each
-/// target.
+/// Hop toward Rx in an interference field, with a receiver at a known position. Its methods compute the sender's x for
+/// a target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
     /// Gain A of the hop, m^2. The hop's SIR is A times `quiet`, divided by the squared length.
@@ -76,12 +76,12 @@ pub struct Retreat<'a> {
     /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest permitted x of this hop's sender, m from Tx.
+    /// Smallest permitted x of this hop's sender, m; Tx is at x = 0.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from the receiver to the sender: its gain, and the interference at the sender. `None` for data in
-    /// one direction. The gain is for the field's largest Upsilon = E[1/I]. It is divided by r, the required ratio of
-    /// backward to forward SIR.
+    /// Backward hop from this hop's receiver to its sender: gain, and interference at the sender. `None` for data in
+    /// one direction. The gain is for the field's largest Upsilon = E[1/I]. This gain is divided by r, the required
+    /// ratio of backward to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
@@ -137,7 +137,7 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with a sender at any x down to Tx: relays closer to Tx need no separation along x.
+    /// Returns this hop with a sender at any x down to 0. No x is left free for relays closer to Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -226,8 +226,8 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest x of the receiver, m, at which the sender at `place` receives the backward hop. The result
-    /// is infinite for data in one direction, and -infinite if no x meets `target`.
+    /// Returns the largest x of this hop's receiver, m, with which the backward hop meets `target`. This hop's sender
+    /// is at x = `place`. The result is infinite for data in one direction, and -infinite if no x meets `target`.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;
@@ -268,8 +268,8 @@ impl<'a> Retreat<'a> {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop that meets `target` with the smallest x of the sender; `None` if no hop meets it. The x of the
-    /// receiver is from `low` to `high`, m.
+    /// Returns the longest hop that meets `target`: the smallest x of the sender. `None` if no hop meets it. The
+    /// receiver is at an x from `low` to `high`, m.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -284,7 +284,7 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is this hop for data toward Rx
+    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the result for data toward Rx
     /// only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
@@ -334,8 +334,8 @@ impl<'a> Retreat<'a> {
     /// Returns the smallest x of the sender for a receiver at `y_m`, m. `quiet` is the receiver's Upsilon divided by
     /// the field's largest Upsilon.
     ///
-    /// Without `best_m` only data toward Rx count. With `best_m` both directions count. The result is then below
-    /// `best_m`, and replaces it.
+    /// If `best_m` is `None`, only data toward Rx count. Otherwise both directions of data count, and the result must
+    /// be below the value in `best_m`, which it replaces.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -364,8 +364,8 @@ impl<'a> Retreat<'a> {
         least(interference, self.gain / target, squares, low, high, value)
     }
 
-    /// Returns the x of the receiver, m, for each hop that just meets the target in both directions. There are at most
-    /// two.
+    /// Returns the receiver's x, m, for each hop that just meets the target in both directions of data. There are at
+    /// most two such hops.
     ///
     /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
     /// backward gain, each divided by the target.
@@ -405,9 +405,9 @@ impl<'a> Retreat<'a> {
 /// Hop along the line: the x of its receiver and the x of its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
-    /// x of the receiver of this hop, m from Tx.
+    /// x of the receiver of this hop, m; Tx is at x = 0.
     pub to_m: f32,
-    /// x of the sender of this hop, m from Tx.
+    /// x of the sender of this hop, m; Tx is at x = 0.
     pub from_m: f32,
 }
 
@@ -479,8 +479,8 @@ struct Piece {
     slope: f32,
 }
 
-/// Returns the hop with the smallest x of its sender, for a receiver's x in [`low`, `high`], m. Of equally good hops it
-/// returns the one with the smallest x of the receiver.
+/// Returns the hop with the smallest x of its sender, for a receiver's x in [`low`, `high`], m. If several hops are
+/// equally good, the function returns the one with the smallest x of the receiver.
 ///
 /// `value` returns the sender's x, y - sqrt(`c` quiet - s), for the receiver's x, y, and for `quiet`. `quiet` is
 /// Upsilon = E[1/I] at y divided by the field's largest Upsilon. `c` is the sender's gain divided by the target, and s

@@ -100,8 +100,7 @@ impl Back {
         })
     }
 
-    /// Returns the squared maximum length of a backward hop, times the forward target SIR, m^2. The receiver is at
-    /// `x_m`.
+    /// Returns the squared maximum length of a backward hop to a receiver at `x_m`, times the target, m^2.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -111,7 +110,7 @@ impl Back {
     }
 
     /// Returns the maximum length of the backward hop along x, m, for its receiver at `x_m`. `across_squared` is the
-    /// squared distance of the hop's ends perpendicular to x, m^2. `None` if no length meets the target.
+    /// squared distance of the hop's ends perpendicular to x, m^2. `None` if no length meets `target`.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
@@ -132,8 +131,8 @@ impl Back {
         }
     }
 
-    /// Returns the distance along x from the interferer, m, below which a receiver misses `target`. `None` if every
-    /// receiver misses it. The backward hop has the squared length `squared`, m^2.
+    /// Returns the distance along x from the interferer, m, below which a receiver misses `target`. `None` if it misses
+    /// the target at every distance. The backward hop has the squared length `squared`, m^2.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }

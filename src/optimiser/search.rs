@@ -25,7 +25,7 @@ use crate::root::sqrt;
 use crate::side::Heading;
 use crate::sir::{self, Sender};
 
-/// Schedule of the target SIRs that the leader tries, one pass along the chain after another.
+/// Schedule of the target SIRs that the leader tries in successive passes along the chain.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
@@ -60,8 +60,8 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference between cubic and linear interpolation for which the cubic result is used. The unit is the gap
-/// between two targets.
+/// Maximum difference between cubic and linear interpolation at which the cubic result is used. The unit is the gap
+/// between the two targets around the result.
 const BEND: f32 = 0.25;
 
 /// Maximum ratio of the bracket's width after a pass to its width before. With a larger ratio the next targets are
@@ -76,10 +76,10 @@ const MOST_SWEEPS: u32 = 48;
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
+    /// Upper bound of the chain's SIR, linear. This is the maximum SIR of the hop between the leader and the nearer
+    /// end, Tx or Rx.
     ceiling: f32,
-    /// First target of the fixed-step schedule, and upper bound of the bracketed schedule. It is gamma_0 of the
-    /// paper.
+    /// First target of the fixed-step schedule (gamma_0 of the paper), or upper bound of the bracketed one.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
@@ -88,8 +88,8 @@ pub struct Search {
     ladder: Ladder,
     tried: u32,
     /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule has
-    /// only plain passes. They are also used after a relay has refused a target, because it cannot take the x that the
-    /// next relay requires.
+    /// only plain passes. Plain passes are also used after a relay has refused a target. A relay refuses a target if it
+    /// cannot take the x that the next relay requires.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if no such target is known.
     most: Option<f32>,
@@ -99,10 +99,11 @@ pub struct Search {
 }
 
 impl Search {
-    /// Creates a search by the leader of `mission` with the profile `leader`. The other relays can have other profiles.
+    /// Creates a search by the leader of `mission` with the profile `leader`. The remaining relays can have different
+    /// profiles.
     ///
     /// # Errors
-    /// [`Infeasible`] if a relay right above the receiver gives the receiver an SIR of 0, because the interferer is
+    /// [`Infeasible`] if a relay above the receiver gives the receiver an SIR of 0, because the interferer is
     /// at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {
@@ -160,8 +161,8 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next targets by `ladder`, which the leader expects to end the search. If `ladder` is for a plain
-    /// pass, all later passes are plain, too.
+    /// Replaces the next list of targets by `ladder`, which the leader expects to end the search. If `ladder` is for a
+    /// plain pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
@@ -284,8 +285,8 @@ impl Search {
 
 /// Lowers the targets `start` and `met` to allow for data from Rx to Tx, and returns both.
 ///
-/// `start` is the upper bound of the search. It becomes at most the maximum SIR of the backward hop to Tx. `met` is a
-/// feasible target. It becomes a target that this hop and the backward hop from Rx also meet.
+/// `start` is the upper bound of the search. It is limited to the maximum SIR of the backward hop to Tx. `met` is a
+/// feasible target. It is lowered until the backward hop to Tx and the backward hop from Rx meet it, too.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -309,7 +310,7 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
 /// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target).
 ///
 /// The cubic curve passes through the four points next to the change of sign. `None` if a straight line gives a very
-/// different target: the slack then jumps, and neither target is meaningful.
+/// different target: the slack then jumps, and no interpolated target is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -350,8 +351,8 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest target that all relays accepted, and the ladder that proposes it again. `None` until a target is
-    /// accepted.
+    /// Highest target that all relays accepted, and the ladder (list of targets) for another pass with it. `None` until
+    /// a target is accepted.
     best: Option<(f32, Ladder)>,
     /// True once the bisection has ended. The best target found is then the result.
     over: bool,
@@ -360,8 +361,9 @@ struct StandTrials {
 impl Search {
     /// Returns the target that a relay has refused in the last pass; `None` if there is none.
     ///
-    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the commit
-    /// from `verdict`, the result of the pass. The refused target follows from the slacks in `verdict`.
+    /// A relay refuses a target if it cannot take the position that the next relay requires. That relay deletes the
+    /// committed target from `verdict`, the result of the pass. The refused target follows from the slacks in
+    /// `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();

@@ -51,10 +51,10 @@ use crate::sir::{Sender, in_noise, square};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// The previous node must take its farthest x that meets the target. Also returned for Tx and Rx, which cannot
-    /// move.
+    /// Requirement that the previous node takes its farthest x that meets the target. Also for Tx and Rx as the
+    /// previous node, although they cannot move.
     AtReach,
-    /// The previous relay must take this x, m, which is short of its farthest x that meets the target.
+    /// Requirement that the previous relay takes this x, m. It is not the farthest x that meets the target.
     At(f32),
 }
 
@@ -68,7 +68,8 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared for many targets. Its maximum length for a target takes three divisions and a square root.
+/// Hop toward Rx, prepared for many targets. To compute its maximum length for a target takes three divisions and a
+/// square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -90,10 +91,10 @@ pub struct Hop {
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
-    /// Largest permitted x of this hop's receiver, m from Tx.
+    /// Largest permitted x of this hop's receiver, m; Tx is at x = 0.
     end_m: f32,
-    /// Maximum x of the receiver and of the sender, m. They leave the relays nearer to Rx room for their minimum
-    /// separation.
+    /// Maximum x of the receiver, and maximum x of the sender, m. Up to these x, the relays nearer to Rx fit with their
+    /// minimum separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a mission without data from Rx to Tx.
     back: Option<Back>,
@@ -102,8 +103,8 @@ pub struct Hop {
 impl Hop {
     /// Creates the hop from `sender` to relay `index`, which has the lateral offset and altitude `at`.
     ///
-    /// `spread_squared` concerns the relays after `index`: it is the largest squared distance between two neighbours
-    /// perpendicular to x, m^2.
+    /// `spread_squared`, m^2, is the largest squared distance, perpendicular to x, between two neighbours among the
+    /// relays after `index`.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -171,7 +172,7 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a receiver at any x up to Rx: relays nearer to Rx need no separation along x.
+    /// Returns this hop with a receiver at any x up to the x of Rx. No x is left free for relays nearer to Rx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -274,9 +275,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The sender is in [0,
-    /// `from_m`]. `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The result
-    /// is larger than `place` if a sender at a smaller x receives the backward hop better.
+    /// Returns the receiver's largest x, m, at which the hop meets `target` in both directions of data. The sender is
+    /// in [0, `from_m`]. `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The
+    /// result is larger than `place` if a sender at a smaller x receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -296,8 +297,8 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. `None` if there is
-    /// none. The receiver is at x = `place`.
+    /// Returns the sender's largest x, m, at which the hop meets `target` in both directions of data. It is at most
+    /// `near`. `None` if there is none. The receiver is at x = `place`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -357,8 +358,8 @@ impl Hop {
         }
     }
 
-    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if the sender has no
-    /// permitted position.
+    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if no permitted
+    /// position of the sender meets `target`.
     ///
     /// `from_m` is the sender's farthest x that meets `target`. The required position is the permitted position
     /// closest to the receiver, because it has the best SIR.
@@ -461,7 +462,7 @@ impl Hop {
     }
 }
 
-/// Relative tolerance of a hop's SIR for rounding errors, when a position is checked.
+/// Relative tolerance on a hop's SIR, for rounding errors, in the check of a position.
 const ROUNDING: f32 = 4e-6;
 
 /// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the result equals `from_m`: two relays must not have
@@ -484,9 +485,9 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 /// Returns the paper's `d_max`, m: the largest distance along x at which a relay meets `target` at Rx.
 ///
 /// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared distance),
-/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above the receiver
-/// is too weak. The result can exceed the distance from Tx to Rx. So it is a smooth function of the target, as the root
-/// search requires.
+/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if a relay vertically above the receiver
+/// is too weak, too. The result can exceed the distance from Tx to Rx. So it is a smooth function of the target, as the
+/// root search requires.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;

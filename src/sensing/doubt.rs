@@ -46,15 +46,16 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Variance of the measurements, divided by the expected one, above which a faulty relay is searched. The operator sets
-/// the expected variance.
+/// Maximum variance of consistent measurements, divided by the variance that the operator expects. With a larger
+/// variance, the leader searches for a faulty relay.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum drop of the fit's residual without the faulty relay. The unit is the variance of the other measurements.
+/// Minimum drop of the fit's residual without the faulty relay. The unit is the variance of the remaining measurements.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual of the fit, and minimum drop without one relay, that can show a faulty relay. The residual is the
-/// sum of squared relative errors. One measurement that is wrong by some 15 % causes this residual.
+/// Minimum residual of the fit that can show a faulty relay. Also the minimum drop of the residual without that relay.
+/// The residual is the sum of squared relative errors. A single measurement with an error of some 15 % causes this
+/// residual.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of the second smallest variance to the smallest that identifies a faulty relay. Each variance belongs
@@ -69,31 +70,32 @@ const CONSISTENT: f64 = 0.1;
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay's measurement fits the others again. The first is a multiple of the variance,
-/// the second a squared relative difference. The larger one counts.
+/// Limits of the squared difference at which an excluded relay's measurement fits the others' again. The first is a
+/// multiple of the variance, the second a squared relative difference. The larger limit counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays to identify a faulty relay. With four relays only three measurements are left, which always
 /// fit the three unknowns.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions to find a faulty relay. Older positions count less, see [`Sums::count`].
+/// Minimum number of measured positions for a search for a faulty relay. Older positions count less, see
+/// [`Sums::count`].
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above it, rounding errors
-/// of the sums exceed this relay's part of the sums.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. With a larger ratio,
+/// rounding errors of the sums exceed this relay's part of the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Normal,
-    /// Trial: a sensing pass that leaves out the measurements of the node with this number. If the measurements of
-    /// the other nodes fit far better then, that node is faulty.
+    /// Trial: a sensing pass that leaves out the measurements of the node with this number. If the measurements of the
+    /// remaining nodes fit far better, the node left out is faulty.
     Trying(u16),
     /// Notice: a sensing pass that tells the faulty node, which has this number, that it is excluded.
     ///
-    /// There are two such passes. In the first one the flag is false, and the measurements of the other nodes are
-    /// discarded. In the second one the flag is true, and they give the estimate.
+    /// There are two such passes. The flag is false in the first pass, whose measurements are discarded. The flag is
+    /// true in the second pass, whose measurements are used for the estimate.
     Announcing(u16, bool),
 }
 
@@ -103,7 +105,7 @@ pub(crate) struct Trial {
     stage: Stage,
     /// Number of sensing passes (collections of measurements) before the next search is allowed to start.
     cooldown: u8,
-    /// Node whose exclusion has given the smallest variance so far.
+    /// Node without which the variance was smallest so far.
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
@@ -234,12 +236,13 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor between measurement and estimate above which a relay doubts its measurement. A factor below the inverse has
-/// the same effect.
+/// Factor between measurement and estimate above which a relay doubts its measurement. The same holds for a factor
+/// below 1 / 300.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. It is then far off the estimate
-/// `expected` at that place, and does not fit the other relays' measurements, whose sums are `others`.
+/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. An absurd measurement is far
+/// from `expected`, the estimate at `place`. It also does not fit the measurements of the remaining relays, whose sums
+/// are `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -259,11 +262,11 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay still does not fit the other relays.
+/// Returns true if the measurement of an excluded relay still does not fit those of the others.
 ///
-/// The measurement v = 1e-12 W / I at `place` is compared with e, the value of the fit to the other relays' sums,
-/// `others`. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the current
-/// estimate, and sets the measurement's weight.
+/// The measurement v = 1e-12 W / I at `place` is compared with e. e is the value at this place of a source fitted to
+/// `others`, the sums of the remaining relays. The difference is (v / e - e / v) / 2, which is symmetric in both.
+/// `expected` is v by the current estimate, and sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -285,11 +288,11 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing should measure several times its noise `noise_w`, W. Its receiver is
-/// then faulty.
+/// Returns true if a relay that measures nothing should receive several times its noise `noise_w`, W. The receiver of
+/// this relay is then faulty.
 ///
-/// The repeated measurements of the other relays, whose sums are `others`, give the expected power. `there` has the
-/// terms of the relay's position.
+/// The expected power follows from the repeated measurements of the remaining relays, whose sums are `others`. `there`
+/// has the terms of the relay's position.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -304,7 +307,7 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than measurement errors explain. ((ratio - 1 / ratio) /
+/// Returns true if a ratio of powers differs from 1 by more than measurement errors can explain. ((ratio - 1 / ratio) /
 /// 2)^2 must then exceed both `deviations` times the variance `unsure`, and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
@@ -314,12 +317,13 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first is a multiple of
-/// the variance, the second a squared relative difference, here a factor of 1.5. The larger one counts.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The limits are for the
+/// squared relative difference. The first is a multiple of the variance; the second corresponds to a factor of 1.5. The
+/// larger limit counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
-/// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
-/// faulty.
+/// Minimum number of relays to check the levels measured at Tx and Rx. With fewer relays it is unknown which
+/// measurement is faulty.
 const FEWEST_FOR_ENDS: u16 = 3;
 
 /// Level measured at Tx or Rx divided by the expected level, and the relative variance of this ratio.

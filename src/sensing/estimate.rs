@@ -74,9 +74,9 @@ pub enum Spread {
     /// Spacing with all hops of the same length.
     #[default]
     Even,
-    /// Spacing with the first hop, from Tx, half as long as the other hops.
+    /// Spacing with the first hop, from Tx, half as long as all other hops.
     TowardTx,
-    /// Spacing with the last hop, to Rx, half as long as the other hops.
+    /// Spacing with the last hop, to Rx, half as long as all other hops.
     TowardRx,
 }
 
@@ -94,42 +94,42 @@ impl Spread {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NumberedEstimate {
-    /// Sequence number of the estimate, 0 for the initial estimate.
+    /// Sequence number of the estimate; 0 for the estimate before any change.
     pub number: u16,
     /// Interference estimate that has this sequence number.
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change of the interference below which a new estimate is not adopted.
+/// Mean square relative change of the interference above which a new estimate is adopted.
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
 /// can mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a stationary source.
-/// Below it the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to that by chance, for a stationary source. With a smaller ratio,
+/// the new estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a moving source. Below
-/// it the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to that by chance, for a moving source. With a smaller ratio, the
+/// new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of the change of the estimate to the change by chance that shows another interferer. Both are mean
-/// square changes. It applies after [`REFINED`] refinements, for a stationary source.
+/// Minimum ratio of an estimate's mean square change to that by chance, which shows a new interferer. This ratio
+/// applies to a stationary source, after [`REFINED`] refinements.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of the interferer's track from the fit, divided by the fit's variance. Above it the
-/// position is not predicted from the track.
+/// Maximum squared deviation of the interferer's track from the fit, divided by the fit's variance. With a larger
+/// deviation the position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
 /// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
 /// measured positions divided by the error variance of one position.
 const LEARNED: f64 = 1.1;
-/// Number of refined estimates after which an estimate stays until the interference changes. It is for a stationary
-/// interferer.
+/// Number of refined estimates of a stationary interferer. After them, the estimate stays until the interference
+/// changes.
 const REFINED: u8 = 4;
 
 /// Time that drones are assumed to need for a few metres. A moving interferer is predicted this far ahead, plus half
@@ -140,16 +140,16 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 /// the interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error of measurements above which they contradict the mission's interference. It is a multiple of the
-/// variance that the operator expects. The relays then treat the interference as unknown.
+/// Mean square error of measurements above which they contradict the mission's interference. The unit is the variance
+/// that the operator expects. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
-/// Quality of the current estimate when it was adopted, and the track of the interferer.
+/// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
     /// Information in the measurements: number of positions divided by the error variance of one position.
     information: f64,
-    /// Expected mean square relative error of the current estimate.
+    /// Expected mean square of the relative error of the current estimate's interference.
     chance: f64,
     /// Number of estimates adopted for the same interferer, up to [`REFINED`].
     refined: u8,
@@ -301,7 +301,7 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer at the position predicted for the time when the drones have moved. `None` if the
+/// Returns a moving interferer at its predicted position for the time when the drones have moved. `None` if the
 /// interferer does not move, or if its track deviates too much from the fit. `heard` is the mean time of the
 /// measurements.
 fn followed(
@@ -327,7 +327,8 @@ fn followed(
 }
 
 /// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added to the relays' measurements. Returns `fit`
-/// unchanged if the level does not agree with them: the path loss over the ground then differs from the mission's.
+/// unchanged if the level does not agree with those measurements: the path loss over the ground then differs from the
+/// mission's.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -438,7 +439,7 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Squared deviation of a new position from the track that shows another interferer. It is divided by the track's
+/// Squared deviation of a new position from the track that shows a new interferer. It is in units of the track's
 /// variance. The track then starts again.
 const ELSEWHERE: f32 = 49.0;
 

@@ -32,7 +32,7 @@ pub enum Unfit {
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance the
-/// measurements do not show if the source is to the right or to the left of the line Tx to Rx.
+/// measurements do not show on which side of the line Tx to Rx the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -52,13 +52,13 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit determines all four unknowns. False if it leaves out the last one, which shows if the source is
-    /// to the right or to the left of the line Tx to Rx.
+    /// True if the fit determines all four unknowns. False if it leaves out the last one, which tells on which side of
+    /// the line Tx to Rx the source is.
     full_rank: bool,
 }
 
-/// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
-/// separate the unknowns of the fit.
+/// Minimum pivot of the matrix factorisation, relative to the first pivot. With a smaller pivot, the measured positions
+/// cannot separate the unknowns of the fit.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -118,8 +118,8 @@ impl Factor {
         last
     }
 
-    /// Returns the variance of the fitted value at a position, for measurements of variance 1. It is r^T G^-1 r, with
-    /// the position's `terms` r and the fit's matrix G.
+    /// Returns the variance of the fitted value at a position, for measurements of variance 1. The variance is r^T G^-1
+    /// r, with the position's `terms` r and the fit's matrix G.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -223,8 +223,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and a small variance. It must be below four times the
-    /// variance that the operator expects.
+    /// Returns true if the fit has more positions than unknowns, and a small variance. The variance must be below four
+    /// times the variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -244,8 +244,8 @@ impl Fit {
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference in interference between the fit and another source. It is the mean
-    /// over the measured positions. The source is given by its four coefficients ([`coefficients`]).
+    /// Returns the mean square relative difference in interference between the fit and a given source. The mean is over
+    /// the measured positions. The source is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)
     }
@@ -258,7 +258,7 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// The measured positions may not determine if the source's y is above or below their mean y. It is then on the
+    /// If the measured positions do not determine on which side of their mean y the source is, the result is on the
     /// side of `side_m`, a lateral offset y.
     ///
     /// # Errors
@@ -322,8 +322,8 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative error of the measurements if a source had these `coefficients`. `sums` are the sums
-/// of the measurements.
+/// Returns the mean square relative error of the measurements for a source with these `coefficients`. `sums` are the
+/// sums of the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [products @ .., av, bv, cv, dv, vv, count, _, _] = sums.numbers.map(f64::from);
     let [a, b, c, d] = *coefficients;
@@ -340,7 +340,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
 }
 
 /// Returns a function that converts the terms of a position to v = 1e-12 W / I there. I is the interference power of
-/// the mission's interferer. The function gives `None` without a known source, or outside of the measurable range.
+/// the mission's interferer. The function gives `None` if the source is not known, or if v is outside of the measurable
+/// range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -349,7 +350,7 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
 }
 
 /// Half width of the square searched for a source, in units of D / 2; D is the distance from Tx to Rx. The square
-/// reaches from D before Tx to D beyond Rx, and 1.5 D to each side.
+/// reaches from x = -D to x = 2 D, and from y = -1.5 D to y = 1.5 D.
 const FARTHEST: f32 = 3.0;
 
 /// Number of grid steps from the middle to the edge of the first grid of the search for a source.
@@ -362,8 +363,8 @@ const FINE: i8 = 2;
 /// grid.
 const FINER: u8 = 5;
 
-/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. They are searched on
-/// grids. Positions are in units of half the distance from Tx to Rx.
+/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. The search tries the points
+/// of grids. Positions are in units of half the distance from Tx to Rx.
 ///
 /// The search covers Y' above `side`, the mean Y' of the measured positions, if `sign` is 1, and Y' below it if `sign`
 /// is -1. It tries 414 positions, in some 16 000 instructions on a Cortex-M4F.

@@ -21,7 +21,7 @@ pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 pub struct Level {
     /// Mean interference power at this ground station, W; 0 without a measurement.
     pub power_w: f32,
-    /// Number of measurements in the mean. Older measurements count less.
+    /// Number of measurements in the mean; an older measurement counts as less than one.
     pub count: f32,
 }
 
@@ -30,7 +30,7 @@ pub struct Level {
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// True if the measurements of Tx and Rx contradict each other, and it is unknown which is faulty.
+    /// True if the measurements at Tx and Rx contradict each other, and it is unknown which is faulty.
     pub(crate) unknown: bool,
 }
 
@@ -71,8 +71,8 @@ pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Four terms of a position. The inverse interference of a source is a linear combination of them. They are 1, u, u^2 -
-/// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
+/// Four terms of a position. The inverse interference of a source is a linear combination of them. The terms are 1, u,
+/// u^2 - 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
 /// Returns the four terms of the position `at`. A source's inverse interference there is a linear combination of
@@ -84,7 +84,7 @@ pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
 }
 
 /// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. The unit is in the middle of the measurable
-/// range, so that an f32 holds the square of v.
+/// range, so that the square of v is within the range of an f32.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
 /// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
@@ -100,17 +100,17 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Converts a source's power to its strength k = eta D^2 [`UNIT_W`] / (4 P), and a strength to a power. P is `power_w`,
-/// in W, eta the mission's path-loss factor to the ground, and D its distance from Tx to Rx.
+/// Converts a source's power to its strength k = eta D^2 [`UNIT_W`] / (4 P). The same formula converts a strength to a
+/// power. P is `power_w`, in W, eta the mission's path-loss factor to the ground, and D its distance from Tx to Rx.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
     0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
-/// Returns the four coefficients of `source`, which turn a position's terms into v = 1e-12 W / I. They are k (X'^2 +
-/// Y'^2 + 1/3), -2 k X', k and -2 k Y'. X' and Y' are the position in units of half the distance from Tx to Rx, and k
-/// is the [`strength`].
+/// Returns the four coefficients of `source`, which turn a position's terms into v = 1e-12 W / I. The coefficients are
+/// k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'. X' and Y' are the position in units of half the distance from Tx to
+/// Rx, and k is the [`strength`].
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -133,8 +133,8 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Number of sums that a sensing pass collects. They are products of terms, terms times v, v squared, number of
-/// positions, number of measurements, and age.
+/// Number of sums that a sensing pass collects. The sums are over products of terms, terms times v, v squared, number
+/// of positions, number of measurements, and age.
 pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.
@@ -142,8 +142,8 @@ pub const SUMS: usize = 18;
 /// The sums for each position: w a b for every two of the four terms a and b, w a v for each term, w v^2, the
 /// position's share, its number of measurements, and its share times its age in seconds. The share is 1 for a new
 /// position and fades. The weight w is 2 (v / e)^(1/2) / (v^2 + e^2), with the measured v and the expected value e of
-/// v. It is 1 / e^2 if both agree. Errors that are equal in decibels have equal weights, and no position has more
-/// weight than all the others.
+/// v. w is 1 / e^2 if v equals e. Errors that are equal in decibels have equal weights, and no position dominates the
+/// sums.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sums {
@@ -290,8 +290,8 @@ impl Listener {
     }
 
     /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units of
-    /// [`UNIT_W`]. `expected` returns 1e-12 W / I for the terms of a position by the current estimate, as needed for
-    /// the weights.
+    /// [`UNIT_W`]. `expected` returns the 1e-12 W / I that the current estimate predicts for the terms of a position;
+    /// the weights need it.
     pub(crate) fn add(
         &mut self,
         now: Instant,
@@ -323,8 +323,8 @@ impl Listener {
         })
     }
 
-    /// Returns the sums of all measurements, with weights and ages as of `now`. `expected` returns v = 1e-12 W / I by
-    /// the current estimate for the terms of a position.
+    /// Returns the sums of all measurements, with weights and ages as of `now`. `expected` returns the v = 1e-12 W / I
+    /// that the current estimate predicts for the terms of a position.
     pub(crate) fn sums(
         &self,
         now: Instant,

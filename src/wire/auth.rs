@@ -23,7 +23,7 @@ impl Key {
         Self(bytes)
     }
 
-    /// Returns the authentication tag of `signed`, the header and body of a frame. `sender` and `receiver` are the
+    /// Returns the authentication tag for `signed`, the header and body of a frame. `sender` and `receiver` are the
     /// nonces of the frame's sender and receiver.
     ///
     /// Work: two to five blocks of BLAKE2s.
@@ -64,8 +64,8 @@ pub struct Auth {
     /// Secret key that authenticates the frames of the network.
     pub key: Key,
     /// Start counter of this relay, from 1, larger at every start. Use a number in flash that is incremented before
-    /// use, or the seconds of a clock that never runs backward. With a reused epoch, frames recorded in it are accepted
-    /// again.
+    /// use, or the seconds of a clock that never runs backward. If an epoch is reused, frames that were recorded in
+    /// this epoch are accepted again.
     pub epoch: u32,
 }
 
@@ -108,7 +108,7 @@ impl Nonces {
     }
 }
 
-/// Key and nonces of one node for authenticating its frames to another.
+/// Key and nonces with which one node signs its frames to a second node.
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
     pub(crate) key: &'a Key,
@@ -127,8 +127,8 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Replay protection for one sender: the frame counters that were accepted. It has the newest accepted frame counter,
-/// and a flag for each of the 63 counters below it.
+/// Replay protection for one sender: the frame counters that were accepted. The type stores the newest accepted frame
+/// counter, and a flag for each of the 63 counters below that one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {

@@ -20,8 +20,8 @@ const START: [u32; 8] = [
     0x5BE0_CD19,
 ];
 
-/// Indices of the 16 message words that each of the ten rounds of BLAKE2s uses (RFC 7693). The first eight are for
-/// the columns, the others for the diagonals.
+/// Indices of the 16 message words that each of the ten rounds of BLAKE2s uses (RFC 7693). The first eight are for the
+/// columns, the last eight for the diagonals.
 const ORDER: [[[u8; 8]; 2]; 10] = [
     [[0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15]],
     [[14, 10, 4, 8, 9, 15, 13, 6], [1, 12, 0, 2, 11, 7, 5, 3]],

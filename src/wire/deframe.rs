@@ -9,7 +9,7 @@
 
 use super::frame::MAX_DECODED;
 
-/// Reason why the bytes between two delimiters are no frame.
+/// Reason why the bytes between two delimiters are not a valid frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum DeframeError {

@@ -80,8 +80,8 @@ fn add(crc: &mut Digest<'_, u32, Table<1>>, bytes: &[u8]) {
     crc.update(bytes);
 }
 
-/// Returns `digest` combined with `sites`, the Tx and Rx positions of an uploaded mission. With `None` the result is
-/// `digest`.
+/// Returns `digest` combined with `sites`, the Tx and Rx positions of an uploaded mission. If `sites` is `None`, the
+/// result is `digest`.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();
@@ -97,11 +97,11 @@ const fn low_half(crc: u32) -> u16 {
 
 /// Identifier of a mission: of an uploaded one, or of the mission loaded before flight.
 ///
-/// Ordered by version; of two missions with the same version, the one with the larger digest counts as newer.
+/// Ordered by version. If two missions have the same version, the one with the larger digest counts as newer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionId {
-    /// Version that the operator gave to an upload, from 1; 0 for the mission loaded before flight.
+    /// Version that the operator gave to the uploaded mission, from 1. 0 for the mission loaded before flight.
     pub version: u16,
     /// Digest of the mission with all relays that it configures, not only those in the current view.
     pub digest: u16,

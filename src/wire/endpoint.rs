@@ -30,7 +30,7 @@ pub(crate) struct Endpoint {
 }
 
 impl Endpoint {
-    /// Creates the endpoint of node `node` in the network `network`. It does not sign frames.
+    /// Creates the endpoint of node `node` in the network `network`, which does not sign frames.
     pub(crate) fn new(network: u16, node: u16) -> Self {
         Self {
             network,
@@ -41,8 +41,8 @@ impl Endpoint {
     }
 
     /// Signs all frames from now on with the key and epoch in `auth`. This node's nonces count up from `claim`, a
-    /// random number drawn at start. If a node is silent for `gone_after`, another node with its number can take its
-    /// session.
+    /// random number drawn at start. Once a node has been silent for `gone_after`, a second node with the same number
+    /// can take its session.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
@@ -70,7 +70,7 @@ impl Endpoint {
     }
 
     /// Checks the authentication tag of `frame`; `None` if this node does not use authentication. Counts every result
-    /// but a valid new message in `stats`.
+    /// in `stats`, except a valid new message.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -89,14 +89,14 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once a signing node has used all frame counters. It must not send before it restarts with a new
-    /// epoch, because a counter must not be used twice.
+    /// Returns true once a signing node has used all frame counters. The node must not send before it restarts with a
+    /// new epoch, because a counter must not be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }
 
     /// Encodes `message` to node `to` into `frame`. If node `to` cannot verify this node's tags yet, a handshake is
-    /// written instead, and the caller sends the message later.
+    /// encoded instead; the caller must then send the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,

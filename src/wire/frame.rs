@@ -17,14 +17,14 @@ const CHECK: usize = 4;
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
-/// Maximum length of a frame on the wire, bytes. COBS adds one byte below 254 bytes, and the delimiter is another
-/// byte.
+/// Maximum length of a frame on the wire, bytes. COBS adds one byte to a frame of fewer than 254 bytes, and the
+/// delimiter adds one.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
 /// Header flag: an authentication tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Header flag: the body is an authentication handshake. It is valid with a tag only.
+/// Header flag: the body is an authentication handshake. A handshake is valid only with a tag.
 const HANDSHAKE: u16 = 0x2000;
 
 /// Buffer for one encoded frame, of the maximum length.
@@ -40,7 +40,7 @@ pub struct Header {
     pub sender: u16,
     /// Node number of the frame's destination.
     pub destination: u16,
-    /// Number of frames that the sender sent before this frame, wrapping.
+    /// Number of frames that the sender has sent before this frame; it wraps.
     pub counter: u32,
 }
 
@@ -53,7 +53,7 @@ pub enum FrameError {
     Short,
     /// The CRC at the end of the frame does not match.
     Crc,
-    /// The frame has another version of the format, or unknown flags.
+    /// The frame has an unknown version of the format, or unknown flags.
     Version,
     /// The message in the frame's body is invalid.
     Message(MessageError),
@@ -104,7 +104,7 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of the buffer `out` for a frame's body. It begins after the COBS code byte and the header.
+/// Returns the part of the buffer `out` for a frame's body. The body begins after the COBS code byte and the header.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
@@ -212,7 +212,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
 /// Decodes header and message of a frame: [`open`], then [`Message::decode`]. The tag is not verified.
 ///
 /// # Errors
-/// [`FrameError`]; a handshake is not a message.
+/// [`FrameError`], also for a handshake, which is not a message.
 pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     let Opened {
         header,

@@ -19,15 +19,16 @@ use crc::{CRC_32_ISCSI, Crc, Table};
 
 /// CRC-32C (Castagnoli), the check sequence at the end of every frame. Constant work per byte.
 ///
-/// Its Hamming distance is 6 for the lengths used here; the Hamming distance of CRC-32 is 5. The table of 256 words
-/// takes 1 KiB of flash. Without a table a full sweep, for which the CRC is computed twice, is far above its budget
-/// of instructions.
+/// Its Hamming distance is 6 for the frame lengths used here; that of CRC-32 is 5. The table of 256 words takes 1 KiB
+/// of flash. Without a table a full sweep, for which the CRC is computed twice, is far above its budget of
+/// instructions.
 pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
 /// Largest valid node number; 4095 is reserved for broadcasts.
 pub const MAX_NODE: u16 = 4094;
 
-/// Number of nearest nodes in one direction to which hellos are sent. One of them becomes the neighbour.
+/// Number of nearest nodes toward Tx, and toward Rx, to which hellos are sent. One of these nodes becomes the
+/// neighbour.
 pub(crate) const CANDIDATES: u16 = 4;
 
 /// Number of nearest relays with which Tx or Rx exchanges messages on a shared channel.

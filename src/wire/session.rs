@@ -35,27 +35,27 @@ use crate::time::{Duration, Instant};
 pub(crate) enum Sender {
     /// The relay itself: the received frame is an echo of a frame that this relay has sent.
     Itself,
-    /// Another node, whose claim to the node number is not known. With signed frames it can be a forger.
+    /// Second node with this node number, whose claim is not known. With signed frames it can be a forger.
     Unknown,
-    /// Another node that claims this relay's node number, with its claim.
+    /// Second node with this node number, and its claim.
     Rival(Rival),
 }
 
-/// Claim of another node to this relay's node number.
+/// Claim of a second node to this relay's node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are equal.
+    /// True if the claiming node's epoch (start counter) is newer than this relay's. False if both epochs are equal.
     pub(crate) newer_epoch: bool,
-    /// True if the other node is passive: it has no setpoint and does not take part in the chain.
+    /// True if the claiming node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the other node certainly sent the claim after this relay's start. The proof is a signature, or this
-    /// relay's own claim number in the message.
+    /// True if the claim was certainly sent after this relay's start. The proof is a signature, or this relay's own
+    /// claim number in the message.
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number, to win against a node that starts later. Of two nodes
-/// with the same node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number. The relay then keeps its node number if a second node
+/// starts with that number. The node with the larger claim number keeps it.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -77,8 +77,8 @@ struct Peer {
     node: u16,
     /// True if an authentication handshake to this node must be sent.
     handshake: bool,
-    /// True if the next handshake requests a reply in any case. If false, it requests one only until the node has
-    /// proved its presence.
+    /// True if the next handshake requests a reply in any case. False to request a reply only until the node has proved
+    /// its presence.
     requests_reply: bool,
     /// True if the node has repeated this relay's nonce. The node is then present, and both nodes know each other's
     /// nonce.
@@ -141,14 +141,14 @@ impl Peer {
 pub(crate) struct Session {
     key: Key,
     epoch: u32,
-    /// Silence of a node after which another node with the same node number is accepted in its place.
+    /// Silence of a node after which a second node with the same node number is accepted in its place.
     gone_after: Duration,
-    /// Random claim number that this relay draws at its start. Of two nodes with the same node number, the one with
-    /// the larger claim number wins. The lower halves of this relay's nonces count up from it.
+    /// Random claim number that this relay draws at its start. If two nodes have the same node number, the one with the
+    /// larger claim number keeps it. The lower halves of this relay's nonces count up from the claim number.
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
     last_number: u32,
-    /// Claim of another node to this relay's node number, as shown by a handshake. `None` once the claim has been
+    /// Claim of a second node to this relay's node number, as shown by a handshake. `None` once the claim has been
     /// read.
     rival: Option<Rival>,
     /// Number of uses of table entries so far, wrapping. Each entry stores it at its last use.
@@ -164,10 +164,10 @@ pub(crate) struct Session {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
     /// Valid message that was not received before, so its sender is present. `first` is true for the sender's first
-    /// proof of this in the present session.
+    /// proof of presence in the present session.
     Fresh { first: bool },
     /// New handshake that contains this relay's current nonce, so its sender is present. `first` is true for the
-    /// sender's first proof of this in the present session.
+    /// sender's first proof of presence in the present session.
     Handshake { first: bool },
     /// Handshake with the right tag but without this relay's current nonce. It can be a recorded handshake, so it does
     /// not prove that its sender is present.
@@ -176,15 +176,15 @@ pub(crate) enum Checked {
     Unsigned,
     /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Authentic frame that was received before, or whose counter is too old to know that.
+    /// Authentic frame that was received before, or whose counter is too old to decide this.
     Replayed,
     /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,
 }
 
 impl Session {
-    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. After a silence of
-    /// `gone_after`, another node with the same number can replace a node.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. After a node's
+    /// silence of `gone_after`, a second node with the same number can replace it.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -232,7 +232,7 @@ impl Session {
     }
 
     /// Schedules a handshake to the known node `to`, once in each lease renewal `number`. The handshake contains this
-    /// relay's nonce, so that another node with this relay's number detects the duplicate.
+    /// relay's nonce, so that a second node with this relay's number detects the duplicate.
     pub(crate) fn show(&mut self, to: u16, number: u16) {
         if self.shown == Some(number) {
             return;
@@ -265,8 +265,8 @@ impl Session {
         }
     }
 
-    /// Returns the claim of another node to this relay's node number, if a handshake has shown one. Returns each
-    /// claim once.
+    /// Returns the claim of a second node to this relay's node number, if a handshake has shown one. Returns each claim
+    /// once.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()
     }
@@ -404,7 +404,7 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns the sender of `frame`, whose sender number is this relay's own: this relay, or another node. Work: the
+    /// Returns the sender of `frame`, which bears this relay's number: this relay or a second node. Work: the
     /// computation of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
@@ -423,7 +423,7 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns the node that made `nonce`: this relay, or another node with this relay's node number. `Unknown` if the
+    /// Returns the node that made `nonce`: this relay, or a second node with this relay's node number. `Unknown` if the
     /// nonce's epoch (start counter) is older than this relay's epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);

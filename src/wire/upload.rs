@@ -38,10 +38,10 @@ pub enum UploadError {
     Field,
     /// A parameter of the new mission is outside its range.
     Mission(MissionError),
-    /// The upload was made for another mission than the mission loaded into this relay before flight.
+    /// The upload was not made for the mission that this relay loaded before flight.
     Base,
-    /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. Or the positions
-    /// are invalid, or have another distance than the mission.
+    /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. Or these positions
+    /// are invalid, or the distance between them is not the mission's distance.
     Line(LineError),
     /// The relay already has the uploaded mission or a newer mission.
     Old,
@@ -97,7 +97,7 @@ impl Upload {
     /// Adds the positions of Tx and Rx to the uploaded mission. Relays compute latitudes and longitudes from them.
     ///
     /// Without this call, relays use the Tx and Rx positions of their configuration, even if an earlier upload had
-    /// others.
+    /// different positions.
     ///
     /// # Errors
     /// [`UploadError::Line`] if the positions define no line, or a line whose length is not the mission's distance.

@@ -89,7 +89,7 @@ fn a_hundred_agree_at_the_least_baud_with_30_percent_loss() {
 
 /// Returns the largest permitted number of claims, and echoes of claims, of a relay until `ended`.
 ///
-/// A claim shows relays if two of them use one number; its receiver sends it back as an echo.
+/// By claims, relays detect that two of them use the same number. The receiver of a claim sends it back as an echo.
 fn most_claims(ended: Instant) -> u64 {
     let ms = ended.as_micros() / 1_000;
     let first = (1..=6).filter(|k| 250 * ((1 << k) - 1) <= ms);
@@ -114,7 +114,7 @@ fn without_faults_one_sweep_is_enough() {
     }
 }
 
-/// Largest accepted growth of a median time or count from 25 to N relays, relative to N log N.
+/// Largest accepted growth of a median time or count from 25 to N relays, divided by that of N log N.
 const MOST: f64 = 1.5;
 
 /// Checks that the time and the messages until an agreement of N relays grow like N log N on bad links.

@@ -70,7 +70,7 @@ fn a_relay_that_is_not_received_is_reported() {
 
 /// Checks that lost and corrupted frames cause no false reports about other nodes.
 ///
-/// A false report says that a node does not receive this relay, has another key, or uses an old epoch.
+/// A false report says that a node does not receive this relay, does not have its key, or uses an old epoch.
 #[test]
 fn a_bad_channel_causes_no_false_reports() {
     for seed in 1..=3 {
@@ -278,8 +278,7 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// Checks that of two relays with the same number the later one gets no setpoint. Both relays must report the
-/// duplicate.
+/// Checks that the second of two relays with the same number gets no setpoint. Both relays must report the duplicate.
 ///
 /// Runs `COUNT` chains for each loss rate; `COUNT` is an environment variable.
 #[test]
@@ -326,8 +325,8 @@ fn a_duplicate_joins_when_the_other_one_is_gone() {
     }
 }
 
-/// Checks that only one of two relays with the same number flies in the end. Both relays start at the same time. The other relay becomes
-/// passive, which means that it gets no setpoint.
+/// Checks that only one of two relays with the same number flies in the end. The two relays start at the same time. One
+/// of them becomes passive, which means that it gets no setpoint.
 #[test]
 fn one_of_two_simultaneous_duplicates_flies() {
     for seed in 0..6 {
@@ -393,7 +392,7 @@ fn forged_frames_make_no_relay_passive() {
     );
 }
 
-/// Checks that a relay with another key and its neighbours report each other once.
+/// Checks that a relay with a wrong key and its neighbours report each other once.
 #[test]
 fn a_key_mismatch_is_reported_with_the_node() {
     for loss in [0.0, 0.3] {
@@ -447,7 +446,7 @@ fn an_epoch_that_went_back_is_reported_with_the_node() {
     }
 }
 
-/// Checks a relay that restarts with its old epoch. Its neighbours take it for a second relay 2.
+/// Checks a relay that restarts with its old epoch. Its neighbours take it for a duplicate of relay 2.
 ///
 /// At each start a relay draws a random claim number. If the new number is the larger one, the relay takes part at
 /// once. Otherwise it reports a duplicate, and gets no setpoint until its neighbours have received nothing of the old

@@ -74,7 +74,7 @@ fn median_and_worst(mut all: Vec<f64>) -> (f64, f64) {
 /// Time at which relay 4 of eight is switched off, s.
 const DIES_S: u64 = 20;
 
-/// Returns the total time, s, without the best positions of the chain after the loss of relay 4.
+/// Returns the total time, s, in which the chain was not at its best positions after relay 4 was lost.
 ///
 /// `None` if the relays never agreed, or unless the seven remaining relays are in one view at the end.
 fn recovery(outcome: &Outcome) -> Option<f64> {
@@ -231,9 +231,10 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
     all
 }
 
-/// Describes the fault at the end of a run with a one-way link. `None` without a fault.
+/// Describes the fault at the end of a run with a one-way link. `None` if there is no fault.
 ///
-/// All relays except one at the failed link must have positions in one view, without changes in the last [`STILL_S`].
+/// All relays, except one of the two at the failed link, must have positions in one view, without changes in the last
+/// [`STILL_S`].
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.observed).collect();
     let agreements = groups(&seen);
@@ -302,7 +303,7 @@ fn during(rng: &mut ChaCha8Rng) -> Instant {
     Instant::from_millis(rng.random_range(0..1_000 * EVENTS_S))
 }
 
-/// Draws start and end of a fault that lasts up to 10 s, 5 s to 2 min, or to the end of the run.
+/// Draws start and end of a fault: it lasts up to 10 s, from 5 s to 2 min, or to the end of the run.
 fn spell(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     let from = during(rng);
     let span = match rng.random_range(0..4) {
@@ -441,8 +442,8 @@ fn random_faults_let_at_most_one_group_fly() {
 
 /// Checks a run in which, before a fix, two groups of relays flew by separate agreements.
 ///
-/// Only the last relay had accepted a view A. Then view B was formed without the relays that had voted for A and
-/// relied on the lease of A.
+/// Only the last relay had accepted view A. Then view B was formed without the relays that had voted for A and relied
+/// on the lease of A.
 #[test]
 fn an_unheard_decision_ends_no_lease() {
     let mut sequence = sequence(6_450);

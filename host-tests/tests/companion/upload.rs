@@ -296,7 +296,9 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         let why = format!(
             "altitude {altitude} m: must be within {range} (the relays' geofence, set before flight by --altitude and --band)"
         );
-        let far = format!("farthest outside is relay 1, at altitude {altitude}.0 m");
+        let far = format!(
+            "every relay with a drone refuses it: farthest outside is relay 1, at altitude {altitude}.0 m"
+        );
         let line = ground(&chain.files, "5", &more).refused(1);
         assert_eq!(
             line,

@@ -111,14 +111,14 @@ fn relays_close_up_to_one_that_leaves() {
     assert_eq!(row.all[0].setpoint(), Some(at(195.0)), "it is gone");
 }
 
-/// Checks that the neighbours of a lost drone, which still hovers, stay beyond the fences between them and it.
+/// Checks that the neighbours of a lost drone that still hovers stay beyond their fences to it.
 #[test]
 fn relays_keep_clear_of_a_lost_relay_without_an_order() {
     // Halfway between the two agreed positions, and half of the separation on both sides.
     assert_eq!(Row::new().close_up(), [145.0, 255.0]);
 }
 
-/// Checks that the neighbours of a relay with the order to leave come no nearer to it while its pilot flies it.
+/// Checks that neighbours come no nearer to a relay with the order to leave while its pilot flies it.
 #[test]
 fn no_relay_closes_up_to_a_pilot() {
     let mut row = Row::new();
@@ -140,7 +140,7 @@ fn a_relay_that_stays_gets_its_room_back() {
     assert_eq!(row.all[1].setpoint(), Some(at(170.0)));
 }
 
-/// Creates the guard of relay 1 that reports the positions `reports` (ms, x) before its first agreement. With `lost` its neighbour is
+/// Creates the guard of relay 1, which reports the positions `reports` before its first agreement. With `lost` its neighbour is
 /// replaced before it was received.
 fn joining(reports: &[(u64, f32)], lost: bool) -> (Guard, Instant) {
     let mut guard = Guard::new(config(), [None, Some(2)], 7, Instant::ZERO);
@@ -191,7 +191,7 @@ fn a_relay_that_joins_from_a_hover_is_known_at_once() {
     }
 }
 
-/// Checks that a relay that joins from a hover does not fly toward a lost drone that it has never received: it may hover anywhere there.
+/// Checks that a relay that joins from its hover does not fly toward a lost drone it never received.
 #[test]
 fn a_relay_that_joins_keeps_clear_of_a_lost_one() {
     let (mut guard, mut now) = joining(&HOVER, true);

@@ -116,7 +116,7 @@ fn a_relay_at_a_wide_gap_is_refused() {
     assert_eq!(freed(&outcome, 3), None);
 }
 
-/// Checks that a relay between neighbours whose indices differ by more than four may leave once a spare between them has joined.
+/// Checks that a relay across a gap of more than four numbers may leave once a spare has joined there.
 #[test]
 fn a_spare_fills_a_wide_gap() {
     for leaver in [3, 5] {

@@ -15,7 +15,7 @@ use uav_relay_scenario::scene::{Relay, Scene};
 /// Number of random chains whose results are averaged, as in the paper.
 pub const DRAWS: u32 = 1000;
 
-/// Mean results of many chains whose relays are at random positions.
+/// Results averaged over many chains whose relays are at random positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
     /// Mean over the random chains of the worst hop's SIR, linear.
@@ -68,15 +68,15 @@ pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
 // may together be longer than the distance. Many chains are then equally good; the one used shortens every hop by the
 // same factor.
 
-/// Largest number of bisection steps for the received power that all hops share.
+/// Largest number of bisection steps in the search for the signal power that all hops can have.
 ///
 /// Any f64 interval needs fewer steps.
 const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m, that maximise the weakest received signal. Interference is ignored.
 ///
-/// All relays get the altitude and power of the first relay. Empty without relays. The cost is that of computing the
-/// length of a chain 200 times.
+/// All relays get the altitude and power of the first relay. The list is empty if the scene has no relays. The cost is
+/// 200 computations of a chain's length.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
         return Vec::new();
@@ -111,13 +111,13 @@ struct Hops<'a> {
 impl Hops<'_> {
     /// Returns the largest signal power that the first and the last hop can both have, W.
     ///
-    /// A relay right above Tx, or right above Rx, has the largest power on its hop.
+    /// The hop from Tx has the largest power if the relay is vertically above Tx; the hop to Rx, if it is above Rx.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)
     }
 
-    /// Returns the horizontal length of the first or last hop, m, if `signal_w` watts are received.
+    /// Returns the horizontal length of a hop from Tx or to Rx, m, at which `signal_w` watts are received.
     ///
     /// `power_w` is the sender's power, W.
     fn outer(&self, power_w: f64, signal_w: f64) -> f64 {

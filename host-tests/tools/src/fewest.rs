@@ -54,8 +54,8 @@ impl Fewest {
     /// Returns the fewest relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`].
     ///
     /// `target` is linear, above 0. The mission's own number of relays is ignored. `profile_of` returns the profile of
-    /// relay 1..=N. `None` if no number of relays meets the target; [`Most::of`] returns the best target that they can
-    /// meet.
+    /// relay 1..=N. `None` if no number of relays meets the target; [`Most::of`] returns the highest target that can be
+    /// met.
     ///
     /// If the result is `proven`, it equals an exhaustive count: `as_few_as_an_exhaustive_count` in
     /// `host-tests/tests/fleet/`. Work with one interferer: a reach (farthest x) for each relay, two with a minimum
@@ -76,8 +76,9 @@ impl Fewest {
 impl Most {
     /// Returns the highest target SIR that any number of relays meets.
     ///
-    /// `None` if it is below 1e-20 of the highest possible SIR of the first hop. With different altitudes, or a minimum
-    /// separation, the target can be met but may not be the highest. Work: 33 times that of [`Fewest::of`].
+    /// `None` if this target is below 1e-20 times the highest possible SIR of the first hop. With different altitudes,
+    /// or a minimum separation, the target can be met but may not be the highest. Work: 33 times the work of
+    /// [`Fewest::of`].
     pub fn of(mission: &Mission, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let meets = |target: f32| {
             let found = counted(mission, target, &profile_of)?;
@@ -105,8 +106,8 @@ impl Most {
 
 /// Returns positions at which the mission's N relays meet the SIR `target`, relay 1 first.
 ///
-/// `None` if they do not meet it. All hops but one have their maximum length, and their SIR is `target` to 1e-4
-/// relative. Work: at most two chains, each with a reach and a required position for every relay.
+/// `None` if the relays cannot meet it. All hops except one have their maximum length, and an SIR of `target` with a
+/// relative error of at most 1e-4. Work: at most two chains, each with a reach and a required position for every relay.
 pub fn places(
     mission: &Mission,
     target: f32,
@@ -127,7 +128,7 @@ fn unseparated(mission: &Mission) -> Option<Mission> {
 
 /// Returns the fewest relays that meet `target`; `None` if no number does.
 ///
-/// Its `proven` is valid only for missions without a minimum separation.
+/// The field `proven` of the result is valid only for missions without a minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))
@@ -193,7 +194,7 @@ fn toward_rx(
     None
 }
 
-/// Computes the reach (farthest x, m) of every relay, and calls `visit` with its index and reach.
+/// Computes the reach (farthest x, m) of every relay. Calls `visit` with the relay's index and reach.
 ///
 /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
 fn ends<F: Fn(u16) -> Profile>(
@@ -215,7 +216,7 @@ fn closes<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     ends(chain, |_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns true if the relays can meet the target, at their reaches or at required positions.
+/// Returns true if the relays can meet the target, at their farthest x or at smaller required x.
 fn is_met<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     closes(chain) && (closes(&chain.plainly()) || chain.place(0).is_some())
 }
@@ -245,7 +246,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>>
     Some(places)
 }
 
-/// Largest number of further relays to try if a minimum separation makes the minimum number fail.
+/// Largest number of relays to add if the minimum number fails because of the minimum separation.
 const MORE: u16 = 32;
 
 const TARGETS: u8 = 48;
@@ -291,10 +292,10 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
 
 /// Returns the highest target SIR that N relays with the same `profile` meet in a field.
 ///
-/// It is linear, and exact to one f32 step. `None` without a field, or if no target is met. It is the optimum if no
-/// minimum separation is binding: `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. In an uneven
-/// field the result of Algorithm 4 may be lower. Work: 48 chains, each with three square roots for every point of the
-/// field and relay.
+/// The result is linear, and exact to one f32 step. `None` if the mission has no field, or if no target is met. The
+/// result is the optimum if no minimum separation is binding: `identical_relays_in_a_field_are_optimal` in
+/// `host-tests/tests/fleet/`. In an uneven field the result of Algorithm 4 may be lower. Work: 48 chains, each with
+/// three square roots for every point of the field and relay.
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;
     let met = |target: f32| is_met_by_equals(mission, target, profile);

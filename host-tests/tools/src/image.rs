@@ -80,7 +80,8 @@ impl Board {
 
     /// Returns cargo's arguments for building the board's image, and the path of the ELF.
     ///
-    /// `radio` selects the image for a shared radio. All paths are relative to the root of the checkout.
+    /// With `radio` it is the image for a shared radio, else the image for a UART to each neighbour. All paths are
+    /// relative to the root of the checkout.
     pub fn build(&self, radio: bool) -> (Vec<String>, PathBuf) {
         let [wires, radios] = self.images;
         let image = if radio { radios } else { wires };
@@ -115,7 +116,7 @@ impl Board {
 
     /// Returns the file name of the board's image without extension.
     ///
-    /// `radio` selects the image for a shared radio.
+    /// With `radio` it is the image for a shared radio, else the image for a UART to each neighbour.
     pub fn stem(&self, radio: bool) -> String {
         format!("{}-{}", self.name, if radio { "radio" } else { "wires" })
     }

@@ -17,10 +17,10 @@ use super::multi_interferer::optimum;
 
 const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 
-/// Random experiment: relays on a line of 1 km, and interferers that they may have to locate.
+/// Random experiment: relays on a line of 1 km, and interferers. In some runs the relays must locate them.
 ///
-/// The interferers have 1 to 100 W. They are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D; D is the distance from
-/// Tx to Rx.
+/// The interferers have 1 to 100 W. The interferers are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D; D is the
+/// distance from Tx to Rx.
 #[derive(Clone, Debug)]
 pub struct RandomScene {
     /// Geometry, powers and the true interferers.
@@ -88,7 +88,7 @@ impl RandomScene {
 
     /// Returns the best SIR that relays can have if they know the interferers, linear.
     ///
-    /// For one interferer a chain is simulated that knows it. For several interferers it is the exact optimum.
+    /// For one interferer it is the SIR of a simulated chain that knows the interferer, for several the exact optimum.
     pub fn optimum(&self) -> Result<f64, FigureError> {
         let scene = self.scene()?;
         if scene.sources.len() > 1 {
@@ -123,7 +123,7 @@ impl RandomScene {
         Ok(setup)
     }
 
-    /// Returns a simulation of drones that fly 10 m/s, and measure the interference every second.
+    /// Returns a simulation of drones that fly at 10 m/s, and measure the interference every second.
     ///
     /// They start beside Tx. `guess` is the interference that the relays assume before the first measurement.
     pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
@@ -228,10 +228,10 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
     numbers.get(at).copied().unwrap_or(f64::NAN)
 }
 
-/// Time from the start of a run, s, after which its SIRs count for the mean.
+/// Time after the start of a run, s, from which on the run's SIRs count for the mean.
 const BEGUN_S: u32 = 60;
 
-/// Means of SIR / best possible SIR at each moment, one mean for each experiment.
+/// Means over time of SIR / best possible SIR, one mean for each experiment.
 ///
 /// The interferer moves. The first minute of a run does not count.
 #[derive(Clone, Debug, Default)]

@@ -991,7 +991,7 @@ fn a_plan_in_another_folder_finds_its_files() {
     assert!(of("own/plan.toml").contains("\nfile = \"zones.geojson\"\n"));
 }
 
-/// Checks no-fly areas on the paths of relays with their own altitudes, and after each loss.
+/// Checks no-fly areas on the paths of relays that keep their altitudes, and after each loss.
 #[test]
 fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let folder = tempfile::tempdir().unwrap();

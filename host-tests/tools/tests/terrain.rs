@@ -147,8 +147,8 @@ fn the_search_finds_the_best_chain_of_a_small_grid() {
 
 /// Checks that positions for the terrain are no worse than those that ignore it.
 ///
-/// The others are the joint method's positions, and positions at 120 m. If they can be flown, the loss must be below
-/// 0.01 dB. The median gain over all scenes must be above -0.1 dB.
+/// Those that ignore the terrain are the joint method's positions, and positions at 120 m. If they can be flown, the
+/// loss must be below 0.01 dB. The median gain over all scenes must be above -0.1 dB.
 #[test]
 fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -508,7 +508,7 @@ fn positions_over_terrain_are_reported_with_their_gain() {
     );
 }
 
-/// Checks SIRs with interferers on hills. They are computed again from the heights of the hills.
+/// Checks SIRs with interferers on hills. The test computes these SIRs itself from the heights of the hills.
 #[test]
 fn interferers_stand_on_the_ground() {
     let folder = tempfile::tempdir().unwrap();
@@ -678,7 +678,7 @@ fn long_lines_have_relays_on_narrow_hilltops() {
     );
 }
 
-/// Checks that the ground counts as higher by the assumed error of the heights.
+/// Checks that the planner adds the assumed error of the heights to the ground.
 #[test]
 fn the_error_of_the_heights_is_a_margin() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,32 +10,32 @@ use super::outlook::Outlook;
 /// Fractions of the relays' computed moves. An iteration tries them in this order until the chain improves.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. It also limits
-/// the change of ln(target SIR).
+/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. The trust also
+/// limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust (limit of the relays' moves) at which an improvement's final target is predicted. With a smaller trust
-/// the prediction would be too low.
+/// Minimum trust (limit of the relays' moves) at which the final target of an improvement is predicted. With a smaller
+/// trust the predicted target would be too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust (limit of the relays' moves) below which the improvement of a chain ends without progress.
+/// Trust (limit of the relays' moves) below which the improvement of a chain is given up.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum assumed rate at which a rising ln(target SIR) shortens the chain. The unit of length is the distance from Tx
-/// to Rx. The rate is a divisor; it is usually 0.5.
+/// Minimum length by which a chain is assumed to shrink per unit of ln(target SIR). The unit is the distance from Tx to
+/// Rx. The usual length is 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the target's limit, in ln(SIR). The limit is raised if the chain meets it but misses the upper
-/// bound of all chains.
+/// First increase of the upper limit on the target SIR, in ln(SIR). The limit is raised if the chain meets it, but does
+/// not reach the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
 /// First upper limit on the chain's slack, divided by the distance from Tx to Rx. Without the limit a large slack could
 /// outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Smallest upper limit on the chain's slack, divided by the distance from Tx to Rx.
+/// Lowest value to which the upper limit on the chain's slack can fall. The unit is the distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Weight of a negative slack relative to a positive slack, when two chains are compared.
+/// Factor on a negative slack of a chain, when two chains are compared.
 const SHORT: f32 = 2.0;
 
 /// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
@@ -52,7 +52,8 @@ const FORESEEN: f32 = 1e-4;
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Largest shortfall from Rx of a chain that is improved again. The unit is the distance from Tx to Rx.
+/// Largest distance to Rx by which a chain is too short and is still improved again. The unit is the distance from Tx
+/// to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -73,19 +74,19 @@ pub(crate) enum AscentStep {
 pub(crate) struct Ascent {
     /// Target SIR of the current chain, as ln(SIR).
     pub(crate) sigma: f32,
-    /// Slack of the current chain, m: how far it could reach beyond Rx at its target SIR. Below 0 if the chain is too
-    /// short.
+    /// Slack of the current chain, m: the length by which it could reach beyond Rx at its target SIR. Below 0 if the
+    /// chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target, in ln(SIR), at which the chain is compared with the upper bound of all chains. It is raised if the chain
-    /// misses this bound.
+    /// Target, in ln(SIR), at which the chain is compared with the upper bound of all chains. This target is raised if
+    /// the chain does not reach the bound.
     pub(crate) limit: f32,
     /// Next increase of `limit`, in ln(SIR).
     excess: f32,
-    /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. It is lowered if relays are too
-    /// near the interferer, because a large slack would outweigh the penalty for them.
+    /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. This limit is lowered if relays
+    /// are too near the interferer: a large slack would outweigh the penalty for such relays.
     spare: f32,
-    /// Penalty for relays too near the interferer, m. It is subtracted from the chain's slack.
+    /// Penalty for relays too near the interferer, m, subtracted from the chain's slack.
     pub(crate) penalty: f32,
     distance_m: f32,
     /// Change of the chain's slack per unit of ln(target SIR), m; below 0.
@@ -108,8 +109,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. Targets are in ln(SIR), and
-    /// never fall below `floor`.
+    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. Targets are in ln(SIR),
+    /// never below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -130,7 +131,7 @@ impl Ascent {
         }
     }
 
-    /// Returns this state with another limit of the target, in ln(SIR).
+    /// Returns this state with `limit` as the upper limit on the target, in ln(SIR).
     ///
     /// At this target the chain is compared with the upper bound of all chains.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
@@ -163,7 +164,7 @@ impl Ascent {
     }
 
     /// Returns the next action after the upper limit on the chain's slack was lowered. `slack` is the chain's slack
-    /// under the new limit, m.
+    /// under the lowered limit, m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -177,8 +178,8 @@ impl Ascent {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the limit of the target SIR; returns the next action. The chain has met the limit, but not the upper
-    /// bound.
+    /// Raises the upper limit on the target SIR; returns the next action. Called if the chain meets the limit, but does
+    /// not reach the upper bound of all chains.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -190,8 +191,8 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. They are the gain
-    /// of slack expected from the relays' moves, and the change of slack with the target.
+    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. The sums are the
+    /// slack that the relays' moves are expected to add, and the change of slack per unit of ln(target SIR).
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -226,19 +227,19 @@ impl Ascent {
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Returns true if the improvement diverges: after 12 iterations the chain still falls far short of Rx.
+    /// Returns true if the improvement diverges: after 12 iterations the chain still ends far before Rx.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a
-    /// chain is improved again, with a lower limit on its slack.
+    /// Returns true if the chain ends at most a tenth of the distance from Tx to Rx before Rx. Only such a chain is
+    /// improved again, with a lower upper limit on its slack.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the improvement of this chain is predicted to end at or below `sigma`, in ln(SIR). Such a chain
-    /// can be dropped. `turn` is the next action of the improvement. False if no prediction is possible.
+    /// Returns true if the improvement of this chain is predicted to end at or below `sigma`, in ln(SIR). `turn` is the
+    /// next action of the improvement. False if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -285,8 +286,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the next action after a trial that did not improve the chain. It is a trial with a smaller fraction of
-    /// the computed moves. After the smallest fraction, new moves are computed with a lower maximum length.
+    /// Returns the next action after a trial that did not improve the chain. The action is a trial with a smaller
+    /// fraction of the computed moves. After the smallest fraction, new and shorter moves are computed.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -299,8 +300,8 @@ impl Ascent {
         turn
     }
 
-    /// Accepts the trial chain, and returns the next action. The relays made the fraction `share` of their computed
-    /// moves. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
+    /// Accepts the trial chain, and returns the next action. `share` is the fraction of their computed moves that the
+    /// relays made in the trial. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);

@@ -54,9 +54,10 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, that leaves later relays room for their minimum separation.
+    /// Returns the largest x of a relay, m, at which the relays toward Rx still fit with their separation.
     ///
-    /// `end_m` is the largest x of the previous relay, m, and `step` the minimum step in x from that relay, m.
+    /// `end_m` is the largest x of the next relay toward Tx, m, and `step` the minimum difference in x from that relay,
+    /// m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
@@ -80,9 +81,9 @@ impl<'a, F: SeatOf> Chain<'a, F> {
 
     /// Returns c, the target SIR divided by the sender's gain, for the hop to relay `index`.
     ///
-    /// The gain is the sender's power divided by the interferer's power. c determines the hop's maximum length. With
-    /// noise, c includes the factor 1 + noise / interference at the sender's position `from`, because the position of
-    /// relay `index` is not known yet.
+    /// The gain is the sender's power divided by the interferer's power. A larger c means a shorter hop. With noise, c
+    /// includes the factor 1 + noise / interference at the sender's position `from`, because the position of relay
+    /// `index` is not known yet.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -90,8 +91,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the fixed altitude of relay `index`, m. `None` if the relay is free to choose its altitude, or if the
-    /// mission allows one altitude only.
+    /// Returns the fixed altitude of relay `index`, m. `None` if the relay chooses its altitude itself, or if the
+    /// mission has a single altitude for all relays.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -104,8 +105,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
 
     /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude.
     ///
-    /// Before the first and after the last of them the altitude is constant if `level` is true. Otherwise it falls to
-    /// the lowest permitted altitude at Tx and at Rx.
+    /// Between Tx and the first of these relays, and between the last one and Rx, the altitude is constant if `level`
+    /// is true. Otherwise it falls to the lowest permitted altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -128,8 +129,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the chain for `target`, m, and its derivatives. They are by the position `at` of the last
-    /// relay.
+    /// Returns the slack of the chain for `target`, m, and the derivatives of the slack. The derivatives are by the
+    /// last relay's position `at`.
     ///
     /// The slack is the maximum length of the last hop for `target`, minus the length of this hop.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
@@ -153,8 +154,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the lowest target, in ln(SIR), that limits the length of every hop. It is just above the largest gain of
-    /// a hop. With a lower target, a hop beyond the interferer could have any length.
+    /// Returns the lowest target, in ln(SIR), at which every hop has a finite maximum length. This target is just above
+    /// the largest gain of a hop. At a lower target, a hop that starts beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -163,8 +164,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 }
 
-/// Gains of all hops of a chain, in both directions. The SIR of a hop is its gain, times the inverse interference at
-/// the receiver, divided by the squared length of the hop. For the receivers Rx and Tx, the gain already includes the
+/// Gains of all hops of a chain, toward Rx and toward Tx. The SIR of a hop is its gain, times the inverse interference
+/// at the receiver, divided by the squared length of the hop. For a hop to Rx or to Tx, the gain includes the inverse
 /// interference.
 ///
 /// Lengths are in units of the distance D from Tx to Rx. The gains can also be stored as logarithms.
@@ -192,8 +193,8 @@ impl Gains {
         from_rx: 0.0,
     };
 
-    /// Returns the gains for relays of `power_w` watts. `stored` converts each gain to its stored form, such as its
-    /// logarithm.
+    /// Returns the gains for relays of `power_w` watts. `stored` converts each gain to the form in which it is stored,
+    /// for example its logarithm.
     pub(super) fn new(
         chain: &Chain<'_, impl SeatOf>,
         power_w: f32,
@@ -212,8 +213,8 @@ impl Gains {
         }
     }
 
-    /// Returns the gains of hop `k` forward and backward. `k` is 1 (from Tx) to N + 1 (to Rx), and `relays` is N.
-    /// `sent_by` returns a gain for the power of the relay with the given index.
+    /// Returns the gains of hop `k` for data toward Rx and toward Tx. `k` is 1 (hop from Tx) to N + 1 (hop to Rx), and
+    /// `relays` is N. `sent_by` returns a gain for the power of the relay with the given index.
     pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
         let there = match k {
             1 => self.from_tx,
@@ -229,8 +230,8 @@ impl Gains {
     }
 }
 
-/// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. Candidates are the
-/// limits of `room`, and the lateral offset 0.
+/// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. The function compares
+/// the limits of `room`, and the lateral offset 0.
 pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -252,11 +253,11 @@ pub(super) const SEGMENT: usize = 10;
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of the solver for one segment, which is ten consecutive relays. It has the x of the relay before the
-/// segment, and the derivatives of the chain's slack by the position of the segment's last relay.
+/// Stored state of the solver for one segment, which is ten consecutive relays. It has the x of the last relay before
+/// the segment, and derivatives of the chain's slack. The derivatives are by the position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
-    /// x of the relay before this segment, m.
+    /// x of the last relay before this segment, m.
     pub(super) x_m: f32,
     /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
     pub(super) slope: Triple,
@@ -336,7 +337,7 @@ impl Seat {
     }
 
     /// Returns the profile of a relay with the altitude and power `own`. The relay keeps this altitude if `holds` is
-    /// true; otherwise it is free to choose another.
+    /// true; otherwise its altitude is optimised.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

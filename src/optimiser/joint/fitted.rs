@@ -27,17 +27,17 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions that a pass tries for each relay: the current one, and two in either direction.
+/// Number of positions that a pass tries for each relay: the current one, and two on each side of it.
 const STATES: usize = 5;
-/// Moves of a relay that a pass tries, in units of the current step width. Of equally good moves the first in this list
-/// is preferred.
+/// Moves of a relay that a pass tries, in units of the current step width. If two moves are equally good, the one
+/// listed first is used.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits that store the choice among the five states of the previous relay.
+/// Number of bits that store a choice among the five tried positions of the previous relay.
 const BITS: usize = 3;
 
-/// Step width at which the search from one initial chain ends, in units of D.
+/// Step width at which the search from one initial chain ends, divided by the distance from Tx to Rx.
 const NARROWEST: f32 = 1.0 / 131_072.0;
-/// Relative gain of a round of passes below which the step width is halved.
+/// Relative decrease of the total hop time in a round of passes, below which the step width is halved.
 const LITTLE: f32 = 1e-3;
 /// Maximum number of rounds of passes over one initial chain.
 const ROUNDS: u8 = 200;
@@ -47,11 +47,11 @@ const AT_ONCE: u16 = 3;
 /// Number of relays per call in all other work of the solver.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to each squared hop length, in units of D^2, so that no hop time is 0.
+/// Amount added to each squared hop length, so that no hop time is 0. The unit is the squared distance from Tx to Rx.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first and last x of the relays, and first step width of the moves, in units of D. If both x are
-/// equal, the relays start there at their minimum separation.
+/// Initial chains: x of relay 1, x of relay N, and first step width. The unit is the distance from Tx to Rx. If the two
+/// x are equal, all relays start there, at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -62,13 +62,13 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Index, from 0, of the initial chain that starts from the best chain found along the line Tx to Rx. Used only if
-/// relays may leave the common altitude or the line.
+/// Index, from 0, of the initial chain that equals the best chain along the line Tx to Rx. Used only if relays are
+/// allowed to leave the line or the common altitude.
 const BEST: u8 = 8;
-/// First step width of the moves from the best chain along the line, in units of D.
+/// First step width of the moves from initial chain [`BEST`], divided by the distance from Tx to Rx.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of further initial chains, as fractions of two ranges. The first range is from 0 to the
-/// largest lateral offset away from the interferer, the second from the common altitude to the highest altitude.
+/// Lateral offset and altitude of two more initial chains, each as a fraction of its range. The lateral offset ranges
+/// from 0 to its limit on the side without the interferer, the altitude from the common to the highest altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Fitted slots of the hops next to a relay: begin and end of each, as fractions of the frame, 0 to 1.
@@ -91,8 +91,8 @@ pub struct SlotShares {
     /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission of one
     /// direction both are 1: the slot is empty.
     pub from_rx: [f32; 2],
-    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
-    /// times this.
+    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate from Rx to Tx is `reverse`
+    /// times this value.
     pub bits_per_hz: f32,
 }
 
@@ -103,7 +103,7 @@ struct Spot {
     quiet: f32,
 }
 
-/// Position tried for one relay, and the shortest total time of the hops from Tx up to that relay.
+/// Position tried for one relay, and the shortest total time of all hops from Tx to that relay.
 #[derive(Clone, Copy, Debug)]
 struct State {
     spot: Spot,
@@ -120,18 +120,19 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains, r, and the minimum separation. r is the data rate back divided by the data rate to
-/// Rx. `gains` has the forward and the backward gain, each divided by the SNR gap.
+/// Hop between two nodes: its gains, r, and the minimum separation. r is the data rate to Tx divided by the data rate
+/// to Rx. `gains` has the gain toward Rx and the gain toward Tx, each divided by the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
     reverse: f32,
-    /// Minimum squared distance of the two relays, in units of D^2. `None` if an end of the hop is Tx or Rx.
+    /// Squared minimum separation of the hop's two relays. `None` for a hop from Tx or to Rx. The unit is the squared
+    /// distance from Tx to Rx.
     apart: Option<f32>,
 }
 
 impl Hop {
-    /// Returns the forward and the backward SINR, linear, each divided by the SNR gap.
+    /// Returns the SINR toward Rx and the SINR toward Tx, linear, each divided by the SNR gap.
     fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
         let l = square(x) + square(y) + square(h) + SHORTEST;
@@ -139,8 +140,8 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times to send one bit toward Rx and r bits back. Both are infinite if two relays are too close or
-    /// out of order.
+    /// Returns the time to send one bit toward Rx, and the time to send r bits toward Tx. r is the data rate to Tx
+    /// divided by the data rate to Rx. Both times are infinite if the hop's relays are too close or out of order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
@@ -164,7 +165,7 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of the positions of an initial chain, some relays at a time. The field is the number of relays done.
+    /// Choice of the positions of an initial chain, some relays per call. The field is the number of relays done.
     Begin(u16),
     /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
     /// the next node to process: 1 for the first relay, N + 1 for Rx.
@@ -172,7 +173,8 @@ enum Work {
     /// Backward pass, from the last relay to the first: moves the relays as in the best combination. The fields are the
     /// next relay to move, and the index of its move in [`MOVES`].
     Back(u16, u8),
-    /// Summation of the hop times of the best chain, and search for its lowest SIR. The field is the next node.
+    /// Summation of the hop times of the best chain, and search for its lowest SIR. The field is the next node to
+    /// process.
     Sum(u16),
 }
 
@@ -183,10 +185,10 @@ pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. At the end of the search, two sums of hop times from Tx to the relay, toward Rx and
-    /// back, replace each relay's x and y.
+    /// Positions of the best chain. At the end of the search, each relay's x and y are replaced by sums of hop times
+    /// over the hops from Tx to the relay: x by the times toward Rx, y by the times toward Tx.
     best_places: [Triple; RELAYS],
-    /// Best state of the previous relay for each of a relay's five states: three bits each.
+    /// Best position of the previous relay for each of a relay's five tried positions: three bits each.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
@@ -198,7 +200,7 @@ pub(super) struct Fitted<const RELAYS: usize> {
     width: f32,
     /// Total hop time of the current chain, which is to be minimised. Infinite if relays are too close.
     time: f32,
-    /// Total hop time of the chain before the current round of passes.
+    /// Total hop time of the current chain at the start of this round of passes.
     before: f32,
     /// Total hop time of the best chain found; 0 until a chain is found.
     best: f32,
@@ -263,8 +265,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    /// Moves relays to their positions in the current initial chain. They are up to [`OTHERS_AT_ONCE`] relays after the
-    /// first `done`. The first pass over the chain follows after the last relay.
+    /// Moves relays to their positions in the current initial chain. One call moves up to [`OTHERS_AT_ONCE`] relays;
+    /// the first `done` relays are already moved. After the last relay, the first pass over the chain begins.
     fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
         let relays = chain.relays();
@@ -318,8 +320,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns the position of node `index`, moved along the current coordinate by `by`. The node stays within its
-    /// limits. Index 0 is Tx, and N + 1 is Rx.
+    /// Returns the position of node `index`, moved by `by` along the current coordinate within its limits. Index 0 is
+    /// Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
@@ -387,8 +389,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         self.work = Work::Pass(end);
     }
 
-    /// Continues after a pass whose best combination of moves has the total hop time `time`. The last relay is in
-    /// `state`.
+    /// Continues after a pass whose best combination of moves has the total hop time `time`. `state` is the index of
+    /// the last relay's move in [`MOVES`].
     fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
@@ -398,7 +400,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Moves relays to their best positions, from relay `index` (which is in `state`) toward Tx.
+    /// Moves relays to their best positions, from relay `index` toward Tx. `state` is the index of that relay's move in
+    /// [`MOVES`].
     fn back(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, state: u8) {
         let end = index.saturating_sub(OTHERS_AT_ONCE);
         let mut state = usize::from(state);
@@ -450,7 +453,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the lower SIR of the hop.
+    /// Returns the times of the hop to node `index` toward Rx and toward Tx. Lowers `worst` to the hop's lower SIR if
+    /// that is smaller.
     fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
@@ -466,7 +470,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are fractions of the
+    /// Returns the end of hop `hop`'s slot toward Rx, and the begin of its slot toward Tx. Both are fractions of the
     /// frame. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
@@ -483,7 +487,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         [end.min(middle), 1.0 - share(back)]
     }
 
-    /// Returns the position of relay `index`, and its slots, once the chain is solved.
+    /// Returns the position of relay `index` and its time slots. The chain must be solved.
     pub(super) fn place(
         &self,
         chain: &Chain<'_, impl SeatOf>,
@@ -511,7 +515,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains. More chains are tried if several lateral offsets or altitudes are allowed.
+/// Returns the number of initial chains. There are more if several lateral offsets or altitudes are allowed.
 fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {

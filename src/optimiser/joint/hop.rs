@@ -55,14 +55,14 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the dependent coordinate of the hop's end by w and p. w are the other two coordinates of
+    /// Second derivatives of the dependent coordinate of the hop's end by w and p. w are the two free coordinates of
     /// the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value for each coordinate
     /// of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end. They are by the other two coordinates w_1 and
-    /// w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end. The derivatives are by the two free coordinates
+    /// w_1 and w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m. The other two coordinates are
+    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m. The two free coordinates are
     /// constant.
     pub(super) by_target: f32,
 }
@@ -80,9 +80,9 @@ impl Reach {
 
     /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`.
     ///
-    /// In all three points the dependent coordinate of the hop's end comes first. `c` is the target SIR divided by
-    /// the gain. `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. At the rim of the
-    /// positions that meet the target no coordinate depends on the others; the result is then [`Reach::FIXED`].
+    /// In all three points the dependent coordinate of the hop's end comes first. `c` is the target SIR divided by the
+    /// gain. `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. If no coordinate of the
+    /// hop's end depends smoothly on the others, the result is [`Reach::FIXED`].
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -163,7 +163,7 @@ pub(crate) enum Coordinate {
     H,
 }
 
-/// Vector with one component for each of the coordinates x, y and h: a position, m, or a derivative.
+/// Vector with the components x, y and h (altitude): a position or a derivative.
 pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
@@ -233,8 +233,8 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is the squared
-    /// distance from the hop's receiver to the interferer, m^2. The result has the form of a condition without noise.
+    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is the squared distance
+    /// from the hop's receiver to the interferer, m^2.
     ///
     /// `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. `c` is the target SIR divided
     /// by the gain, and `e` is c - 1.

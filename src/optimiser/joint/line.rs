@@ -32,17 +32,16 @@ impl Noted for [f32; 2] {
 /// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx and at the end of the pass
-    /// back.
+    /// Index of the relay that the pass has computed last. 0 before the pass to Rx, and at the end of the pass back.
     index: u16,
-    /// True while the solver passes along the chain from Rx back to Tx.
+    /// True during the pass along the chain from Rx back to Tx.
     is_back: bool,
-    /// True if some relay has to stay short of its farthest x, or if data flow in both directions.
+    /// True if some relay has to stay closer to Tx than its farthest x, or if data flow in both directions.
     holds_back: bool,
     /// x of relay `index`, m. In the pass to Rx it is the farthest x that meets the target; in the pass back it is
     /// the final x.
     x_m: f32,
-    /// Upper limit of the x of relay `index`, m, which leaves the relays after it their separation.
+    /// Upper limit of the x of relay `index`, m. Up to this x, the relays toward Rx fit with their separation.
     end_m: f32,
 }
 
@@ -55,12 +54,11 @@ impl Line {
         end_m: 0.0,
     };
 
-    /// Continues Algorithm 1 by some relays, for the target `sigma`, in ln(SIR). Ready with `None` if the target cannot
-    /// be met. Otherwise ready with true if some relay has to stay short of its farthest x, else false.
+    /// Continues Algorithm 1 by some relays, for the target `sigma`, in ln(SIR). `Ready` with `None` if the target
+    /// cannot be met, with true if some relay has to stay closer to Tx than its farthest x, else with false.
     ///
-    /// `cells` has the lateral offsets and altitudes, and `notes` receives the x. Relay 1 stays at least the first of
-    /// `closed` away from Rx, and the last relay at least the second away from Tx, as fractions of the distance from Tx to
-    /// Rx.
+    /// `cells` has the relays' lateral offsets and altitudes; their x are written to `notes`. `closed` has the minimum
+    /// distance along x of relay 1 from Rx and of the last relay from Tx, as fractions of the distance from Tx to Rx.
     pub(super) fn step<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -91,7 +89,7 @@ impl Line {
         Poll::Pending
     }
 
-    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay the result is its
+    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay it computes the
     /// final x. `None` if the target cannot be met.
     fn there<const RELAYS: usize>(
         &mut self,
@@ -131,7 +129,7 @@ impl Line {
         Some(())
     }
 
-    /// Computes the final x of the relay before relay `index`, which is at `x_m`. `None` if `target` cannot be met.
+    /// Computes the final x of relay `index` - 1, with relay `index` at `x_m`. `None` if `target` cannot be met.
     fn back<const RELAYS: usize>(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -179,8 +177,8 @@ fn hop<const RELAYS: usize>(
     .ending(end_m)
 }
 
-/// Returns the chain's slack, m, and the final x of the last relay, m. `reaches` are the farthest x of the last two
-/// relays, m, and `end_m` is the upper limit of the last relay's x.
+/// Returns the chain's slack, m, and the final x of the last relay, m. `[from_m, reach_m]` are the farthest x of the
+/// last two relays, m, and `end_m` is the upper limit of the last relay's x.
 fn ending<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,
@@ -220,7 +218,7 @@ fn ending<const RELAYS: usize>(
 }
 
 impl<const RELAYS: usize> Cells<RELAYS> {
-    /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
+    /// Returns the minimum difference in x, m, that keeps relay `index` separated from relay `index` - 1.
     pub(super) fn least_step(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         if index <= 1 {
             return 0.0;
@@ -230,7 +228,7 @@ impl<const RELAYS: usize> Cells<RELAYS> {
         chain.mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
+    /// Returns the largest x of relay `index`, m, at which the relays toward Rx fit with their separation.
     pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
         let first = chain.distance_m() - steps.clone().sum::<f32>();

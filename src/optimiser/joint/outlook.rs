@@ -12,8 +12,8 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. It assumes that the
-/// relays toward Rx react optimally.
+/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. The function assumes
+/// that the relays toward Rx react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack with respect to the relay's x, y and h, m per m.
@@ -22,11 +22,10 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack with respect to the target ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f, 0 to 1, is the fraction of their
-    /// computed moves that this relay and the relays toward Rx make.
+    /// Coefficient a of a f + b f^2, the increase of the slack by the relays' moves, m. This relay and all relays
+    /// toward Rx make the fraction f, 0 to 1, of their computed moves.
     pub(crate) linear: f32,
-    /// Coefficient b of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of the moves, as for
-    /// `linear`.
+    /// Coefficient b of a f + b f^2, the increase of the slack by the relays' moves, m; see `linear`.
     pub(crate) square: f32,
 }
 
@@ -57,9 +56,9 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the squared
-    /// distance that the relay lacks, m^2. `slope` and `by_target` are the derivatives of `near` by the position and by
-    /// ln(target SIR).
+    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near`, m^2, is the squared
+    /// minimum distance from the interferer minus the squared actual distance. `slope` and `by_target` are the
+    /// derivatives of `near` by the relay's position and by ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -73,9 +72,9 @@ impl Outlook {
         }
     }
 
-    /// Replaces the value function of a hop's receiver by its sender's; returns the receiver's policy. The policy is a
-    /// move in two coordinates, within [`low`, `high`], m, relative to the present position. The third coordinate,
-    /// `axis`, follows from the hop's maximum length.
+    /// Replaces the value function of a hop's receiver by the sender's, and returns the receiver's policy. The policy
+    /// is a move in two coordinates from the present position, within [`low`, `high`], m. The third coordinate, `axis`,
+    /// follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -239,8 +238,8 @@ impl Policy {
 
     /// Returns the relay's move in its two free coordinates, m. The third coordinate follows from the hop.
     ///
-    /// The move is the fraction `share` of the relay's own step, plus the reaction to `change`, the move of the
-    /// previous relay in x, y and h, m.
+    /// The move is `share` times the relay's `step`, plus the reaction to `change`, the move of the sender in x, y and
+    /// h, m.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;
@@ -312,7 +311,7 @@ impl Brief {
     }
 }
 
-/// Compresses a finite f32 to 16 bits, which keep about three decimal digits; `widened` restores it.
+/// Compresses a finite f32 to 16 bits (about three decimal digits). The inverse is `widened`.
 pub(super) const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

@@ -40,7 +40,7 @@ pub(crate) struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    /// Creates the relay to be placed, which receives from `sender`; `first` is true if the sender is Tx. `room` has
+    /// Creates the relay to be placed, which receives from `sender`. `first` is true if this sender is Tx. `room` has
     /// the permitted lateral offsets and altitudes of the relay.
     pub(crate) fn new(
         mission: &'a Mission,
@@ -71,8 +71,8 @@ impl<'a> Site<'a> {
 
     /// Returns the position of largest x that meets `target` with the lateral offset and altitude `wanted`.
     ///
-    /// The sender is at x = `from_m`. If the hop cannot reach `wanted`, the closest lateral offset and altitude that
-    /// it can reach are used. `None` if no hop meets the target. The x is at most the x of Rx.
+    /// The sender is at x = `from_m`. If the hop cannot reach the lateral offset and altitude `wanted`, the closest
+    /// ones that it can reach are used. `None` if no hop meets the target. The x is at most the x of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -99,9 +99,9 @@ impl<'a> Site<'a> {
     /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
     ///
     /// The x of the hop's end must not be smaller than the x of the sender. The search goes along a straight line to
-    /// `wanted`. It starts at the permitted position closest to the middle of the reachable positions. `None` if no
-    /// permitted position is reached. With the sender at p, the interferer at m and c = target / gain > 1 the reachable
-    /// positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// `wanted`. It starts at the permitted position closest to the middle of the reachable positions. `None` if the
+    /// hop reaches no permitted position. With the sender at p, the interferer at m and c = target / gain > 1 the
+    /// reachable positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -115,7 +115,8 @@ impl<'a> Site<'a> {
     }
 
     /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is its centre
-    /// and squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
+    /// and squared radius, m^2. `None` if c = target / gain is at most 1: the hop then reaches any lateral offset and
+    /// altitude.
     fn disk(
         &self,
         target: f32,
@@ -166,8 +167,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest position that the hop reaches on the way to `wanted`, found by bisection. The way is
-    /// straight in lateral offset and altitude, and starts at those of the sender.
+    /// Returns the farthest position that the hop reaches on the way to `wanted`, found by bisection. The way is a
+    /// straight line in lateral offset and altitude, from the sender's lateral offset and altitude.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -185,8 +186,8 @@ impl<'a> Site<'a> {
 
     /// Returns the relay's new lateral offset and altitude after a fraction of its computed move.
     ///
-    /// `policy` gives the move, and `share` the fraction. The sender has already moved by `change` to `from`, but the
-    /// relay is still at `nominal`. The hop has to meet `target`.
+    /// `policy` gives the move, and `share` the fraction. The sender has already moved by `change` to `from`; the relay
+    /// has not moved yet and is at `nominal`. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -264,8 +265,8 @@ impl<'a> Site<'a> {
 }
 
 /// Returns the coordinate of a hop's end at which the hop just meets its target, m. The triples have this coordinate
-/// first; `a` and `b` are the other two coordinates of the end. If there are two solutions, `rising` selects the larger
-/// solution. `None` without a solution.
+/// first; `a` and `b` are the two known coordinates of the hop's end. If there are two solutions, `rising` selects the
+/// larger solution. `None` if there is no solution.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -317,7 +318,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay. Each has three bytes, as a fraction of the allowed range.
+/// Stored lateral offset and altitude of one relay. Three bytes for each hold a fraction of the allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
@@ -411,7 +412,7 @@ impl Room {
         }
     }
 
-    /// Returns the limit of the lateral offset, m, on the side of the line Tx to Rx without the interferer.
+    /// Returns the limit of the lateral offset, m, on the side of the line Tx-Rx opposite the interferer.
     pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
         if interferer.y_m > 0.0 {
             self.lateral.least_m
@@ -430,20 +431,20 @@ impl Room {
     }
 }
 
-/// Factor from the maximum SIR of the first or last hop to the upper bound of the chain's SIR. The margin leaves the
-/// first and the last relay a choice of position.
+/// Factor on the maximum SIR of the first or the last hop, for the upper bound of the chain's SIR. At the maximum
+/// itself, the first and the last relay would have no choice of position.
 const LITTLE: f32 = 0.999_97;
 
 /// Number of bisection steps for the position with the largest SIR of a first hop with noise.
 const END_HALVINGS: u8 = 24;
 
-/// Returns the maximum SIR of the first hop, less a margin that leaves the relay a choice of position. `room` has the
-/// allowed lateral offsets and altitudes.
+/// Returns the maximum SIR of the first hop, times the factor [`LITTLE`]. `room` has the allowed lateral offsets and
+/// altitudes.
 ///
-/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are the
-/// squared distances from Tx to the interferer along that direction and perpendicular to it; h is the altitude, and nu
-/// the noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
-/// which falls with t. So with noise there is one optimum, closer to Tx.
+/// The best position is on the side of Tx opposite the interferer, t times as far from Tx as the interferer. U and B
+/// are the squared distances from Tx to the interferer along that direction and perpendicular to it; h is the altitude,
+/// and nu the noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t
+/// s^2, which falls with t. So with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -469,7 +470,7 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, less a margin. `room` has the permitted
+/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, times [`LITTLE`]. `room` has the permitted
 /// lateral offsets and altitudes of the relay.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
@@ -478,23 +479,24 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Weight of the penalty for a violated minimum separation, in distances from Tx to Rx. It is so large that no gain of
-/// slack is worth a violation.
+/// Weight of the penalty for a violated minimum separation, in units of the distance from Tx to Rx. The weight is so
+/// large that a violation never improves a chain.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from a limit of its range within which a relay counts as at the limit. The unit is the distance from Tx to
-/// Rx.
+/// Distance from a limit of a coordinate's range, within which the relay counts as at the limit. The unit is the
+/// distance from Tx to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference up to which the squared length of a hop counts as its maximum. It is for hops that end at the x
-/// of Rx. With a larger difference the hop does not restrict the move of its receiver.
+/// Relative difference of a hop's squared length from its maximum, up to which it counts as maximum. Used for hops that
+/// end at the x of Rx. A shorter hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
     /// Returns the penalty terms of a relay at `to` that may be too near the interferer.
     ///
-    /// The first number is the squared distance that the relay lacks, m^2; 0 if it is far enough away. The second is
-    /// the weight of the penalty. The third is the derivative of the first by ln(target SIR).
+    /// The first number is the squared minimum distance minus the squared actual distance, m^2; 0 if the relay is far
+    /// enough away. The second is the weight of the penalty. The third is the derivative of the first by ln(target
+    /// SIR).
     ///
     /// `c` is the target SIR divided by the sender's gain. A hop of maximum length from p to p' that ends near the
     /// interferer at m is short. It violates the minimum separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2,
@@ -581,9 +583,9 @@ impl Site<'_> {
 
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// It is not at a limit of its permitted range, `low` to `high`, and F changes most with it; x is preferred. F is
-    /// half the margin of the hop to its target: 0 for a hop of maximum length (see `hop`). The second result is the
-    /// derivative of F by the selected coordinate.
+    /// It is the coordinate with the largest derivative of F among those that are not at a limit, `low` or `high`; x is
+    /// preferred. F is half the margin of the hop to its target: 0 for a hop of maximum length (see `hop`). The second
+    /// result is the derivative of F by the selected coordinate.
     fn axis(
         &self,
         c: f32,

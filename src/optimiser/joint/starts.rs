@@ -17,32 +17,34 @@ pub(super) enum Start {
     /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and height of its middle,
     /// in units of half the distance from Tx to Rx.
     Arch { aside: f32, up: f32 },
-    /// Initial chain on a spiral about the interferer. The spiral leads from Tx to Rx through a position P right
+    /// Initial chain on a spiral about the interferer. The spiral leads from Tx to Rx through a position P exactly
     /// above or beside the interferer.
     ///
     /// `aside` and `up` are the direction from the interferer to P. `far` is the distance of P from the interferer,
     /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
     /// Initial chain on a parabola as for `Arch`, but without a minimum separation. The solver then searches the
-    /// highest target of this chain. It computes the hops exactly as the relays do in flight, and a relay is allowed to
-    /// stay short of its farthest position.
+    /// highest target of this chain. The solver computes the hops exactly as the relays do in flight, and a relay is
+    /// allowed to stay closer to Tx than its farthest x.
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
-    /// altitudes of the other relays are interpolated between the fixed altitudes.
+    /// altitudes of all other relays are interpolated between the fixed altitudes.
     ///
     /// If `level` is true, the altitude stays constant from the outermost fixed relay to Tx or Rx. If it is false,
     /// the altitude falls to the lowest permitted altitude at Tx and at Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation.
+    /// Initial chain in a zigzag, for relays that do not fit between Tx and Rx in one line.
     ///
     /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position one
-    /// separation beside it. The corner is at the highest altitude, on the side away from the interferer.
+    /// separation beside it. The corner is at the highest altitude, on the side of the line Tx to Rx opposite the
+    /// interferer.
     Turns,
-    /// Initial chain at the lowest altitude, for a target so high that no hop can pass the interferer.
+    /// Initial chain at the lowest altitude, for a target with which no chain gets past the interferer.
     Near,
-    /// Initial chain with relay 1 at the x of Rx, high above Rx or far to the side of Rx. The lateral offsets and
-    /// altitudes of the other relays lead from there in equal steps to the line Tx-Rx and the lowest altitude.
+    /// Initial chain with relay 1 at the x of Rx, high above Rx or beside Rx at the largest lateral offset. The lateral
+    /// offsets and altitudes of the other relays lead from there in equal steps to the line Tx-Rx and the lowest
+    /// altitude.
     Far,
 }
 
@@ -57,10 +59,10 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of entries of [`ARCHES`], from the first, that are also tried without a separation.
+/// Number of entries of [`ARCHES`], from the first, that are also tried without a minimum separation.
 const THROUGH: usize = 3;
 
-/// Initial chains for relays with fixed altitudes among them; see [`Start::FixedAltitudes`].
+/// Initial chains for missions with fixed altitudes; the fields are those of [`Start::FixedAltitudes`].
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -198,8 +200,8 @@ impl Start {
         })
     }
 
-    /// Returns the initial chain `number` for relays limited to the lateral offsets and altitudes `room`. `None` if
-    /// there is no chain with this number; `Some(None)` if the chain does not fit into `room`.
+    /// Returns the initial chain `number` for relays with the lateral offsets and altitudes `room`. `None` if there is
+    /// no chain with this number; `Some(None)` if the chain does not fit into `room`.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -262,7 +264,7 @@ impl Start {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
     /// Highest target found feasible, in ln(SIR); `None` until a target is found. The `bool` is true if some relays
-    /// have to stay short of their farthest x to meet this target.
+    /// have to stay closer to Tx than their farthest x to meet this target.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -287,7 +289,7 @@ impl Seek {
 
     /// Creates a search upward from the feasible target `sigma`, in ln(SIR), to the precision `width`. The first step
     /// is `step`; each further step is three times the previous one. `holds_back` is true if some relays have to stay
-    /// short of their farthest position to meet `sigma`.
+    /// closer to Tx than their farthest x to meet `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -299,10 +301,10 @@ impl Seek {
         }
     }
 
-    /// Records if the chain meets the target that was tried. Returns true if the search goes on with another target.
+    /// Records if the chain meets the target that was tried. Returns true if there is a further target to try.
     ///
-    /// `met` is `None` if the target is infeasible. Otherwise `met` is true if some relays have to stay short of
-    /// their farthest positions to meet the target.
+    /// `met` is `None` if the target is infeasible. Otherwise `met` is true if some relays have to stay closer to Tx
+    /// than their farthest x to meet the target.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -329,7 +331,7 @@ impl Seek {
     }
 
     /// Returns the highest feasible target found, in ln(SIR); `None` if no target is feasible. The `bool` is true if
-    /// some relays have to stay short of their farthest position to meet this target.
+    /// some relays have to stay closer to Tx than their farthest x to meet this target.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }

@@ -19,13 +19,13 @@ pub struct Hello {
     pub mission: u16,
     /// Identifier of the latest view known to the sender.
     pub latest_view: ViewId,
-    /// Node number of the sender's neighbour on the destination's side of the sender; 0 for none.
+    /// Node number of the sender's neighbour on the side where the destination is; 0 for none.
     pub neighbour: u16,
     /// True if the sender requests a hello in return.
     pub requests_reply: bool,
     /// True if the sender requests a new view (agreed members of the chain).
     pub requests_view: bool,
-    /// True if the sender has restarted and has not taken part in any pass or view yet.
+    /// True if the sender has not taken part in any pass or view since its start.
     pub fresh: bool,
     /// Readiness of the sender or of the destination.
     ///
@@ -34,11 +34,11 @@ pub struct Hello {
     /// - If the sender is outside of the chain: true if it would join the chain when it is called.
     /// - If the destination is outside of the chain: true if the destination is called to join.
     pub ready: bool,
-    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are the
-    /// connected relays from the sender to the end of the chain beyond it.
+    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. Counted are
+    /// the connected relays from the sender on, in the direction away from the destination.
     pub behind: u16,
-    /// Nodes that the sender receives on the destination's side. Bit i, 0 to 3, stands for the node whose number
-    /// differs from the sender's by i + 1.
+    /// Nodes that the sender receives on the side where the destination is. Bit i, 0 to 3, stands for the node whose
+    /// number differs from the sender's by i + 1.
     pub hears: u8,
     /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,
@@ -59,8 +59,8 @@ pub struct Hello {
 }
 
 impl Hello {
-    /// Returns true if the sender of this hello, node `by`, receives node `of`. False for nodes more than four
-    /// numbers away.
+    /// Returns true if the sender of this hello, node `by`, receives node `of`. False if the two node numbers differ by
+    /// more than four.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
@@ -130,20 +130,20 @@ impl Hello {
     }
 }
 
-/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions along
-/// the chain, so that two nodes with the same number detect each other.
+/// Claim of a node to its node number, or the echo of such a claim. Claims are sent toward Tx and toward Rx, so that
+/// two nodes with the same number detect each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim
-    /// number wins. A node draws it at its start, and raises it at most once while it is active.
+    /// Random claim number of the claiming node. If two nodes have the same node number, the node with the larger claim
+    /// number keeps it. A node draws its claim number at its start, and raises it at most once while it is active.
     pub number: u32,
-    /// Last claim number received from another node with the claiming node's node number; 0 for none.
+    /// Last claim number received from a second node with the claiming node's node number; 0 for none.
     pub other_number: u32,
-    /// True if the claiming node is passive because another node uses its node number.
+    /// True if the claiming node is passive because a second node uses its node number.
     pub passive: bool,
     /// True for an echo: the sender returns a claim to the destination's node number. If two nodes have this number,
-    /// both receive the echo. So each of them learns of the other's claim.
+    /// both receive the echo, and each learns the claim of its duplicate.
     pub echo: bool,
 }
 
@@ -168,8 +168,8 @@ impl Claim {
     }
 }
 
-/// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit
-/// along x that keeps two neighbours apart; `line_digest` is the digest in the message.
+/// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit of x
+/// that keeps two neighbours separated. `line_digest` is the digest in the message.
 pub(super) fn encode_fence(line_digest: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, line_digest);
     let numbers = [fence.echo, fence.number].map(Word::new);

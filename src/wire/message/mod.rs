@@ -29,7 +29,7 @@ use crate::guard::Fence;
 /// Maximum length of a sweep message's body, bytes. A sweep carries target SIRs along the chain.
 const SWEEP: usize = 88;
 
-/// Maximum length of a message body other than a mission offer, bytes.
+/// Maximum length of all message bodies except mission offers, bytes.
 const LONG: usize = if SENSING { round::HEARD } else { SWEEP };
 
 /// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it is
@@ -56,8 +56,8 @@ impl Upload {
 
 /// Message between neighbours.
 ///
-/// A *pass* is a message that travels along the chain once; its result travels back. *Onward* is the direction of a
-/// pass: toward Rx, or toward Tx if the mission has an interference field.
+/// A *pass* is a message that travels once along the whole chain; its result travels back. *Onward* is the direction of
+/// a pass: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
     /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each target.
@@ -69,9 +69,10 @@ pub enum Message {
         /// Number of the pass in progress; for a view proposal, a 16-bit hash of the proposed view.
         number: u16,
     },
-    /// Either direction: heartbeat request, reply, or both.
+    /// Message toward Tx or toward Rx: heartbeat request, reply, or both.
     Heartbeat {
-        /// Digest of the sender's mission as loaded before flight. It reveals a wrong configuration before take-off.
+        /// Digest of the sender's mission as loaded before flight. By this digest, nodes detect different missions
+        /// before take-off.
         mission: u16,
         /// Number of the sender's own heartbeat request, 0 for none.
         request: u16,
@@ -94,21 +95,21 @@ pub enum Message {
     Pulse(Pulse),
     /// Reply to a lease renewal: its acknowledgement.
     Pulsed(Pulsed),
-    /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
+    /// Message toward Tx or toward Rx, not only to neighbours: the sender's neighbours and view.
     Hello(Hello),
     /// Message to the next relay: proposal of a new view (membership of the chain), with the votes so far.
     Proposal(Proposal),
     /// Reply to a proposal of a view: the decision on it.
     Decision(Decision),
-    /// Either direction: limit of x (fence) that keeps two neighbouring relays apart.
+    /// Message toward Tx or toward Rx: limit of x (fence) that keeps two neighbouring relays separated.
     Fence {
-        /// Digest that shows two neighbours if they have the same x axis. It covers the mission loaded before flight,
-        /// and the Tx and Rx positions of an uploaded mission.
+        /// Digest by which two neighbours detect that they use different x axes. The digest covers the mission loaded
+        /// before flight, and the Tx and Rx positions of an uploaded mission.
         line_digest: u16,
         /// Content of the message: the sender's limit of x, the x of its agreed position, and flags.
         fence: Fence,
     },
-    /// Either direction, also from the ground: a mission that is newer than the destination's.
+    /// Message toward Tx or toward Rx, or from the ground: a mission that is newer than the destination's.
     Offer {
         /// Uploaded mission that the sender offers.
         upload: Upload,
@@ -122,9 +123,9 @@ pub enum Message {
         /// Mean received interference power, W: 1e-30 to 1e6. It includes the noise of the measuring receiver.
         power_w: f32,
     },
-    /// Either direction: claim to the sender's node number, or the echo of another node's claim.
+    /// Message toward Tx or toward Rx: claim to the sender's node number, or the echo of such a claim.
     Claim(Claim),
-    /// Request for the reports of all relays; forwarded from relay to relay, away from the ground station.
+    /// Request for reports of all relays; forwarded from relay to relay, away from the ground station.
     Watch {
         /// Number of the request, wrapping. The station raises it every five seconds.
         number: u16,
@@ -136,8 +137,8 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest in the message; `None` for a message without one. It shows the receiver if both nodes have
-    /// the same mission, view or x axis.
+    /// Returns the digest in the message; `None` for a message without one. By the digest the receiver detects that its
+    /// mission, view or x axis differs from the sender's.
     pub fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -187,8 +188,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward in the direction of a pass. They are passes, proposals and lease
-    /// renewals, but not the replies.
+    /// Returns true for messages that relays forward in the direction of a pass. These are passes, proposals and lease
+    /// renewals, but not the replies to them.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

@@ -52,7 +52,7 @@ impl Upload {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Version of the upload, and digest of the mission loaded before flight, which the upload replaces.
+    /// Version of the upload, and digest of the mission loaded before flight, which this upload replaces.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],

@@ -20,8 +20,8 @@ use crate::wire::message::parts::{
 
 /// Sweep message: target SIRs, and the farthest x at which the sender meets each target.
 ///
-/// The message travels along the chain in a pass. "Farthest" means in the direction of the pass; at no x farther away
-/// is the target met.
+/// The message travels along the chain in a pass. "Farthest" means in the direction of the pass: the target is missed
+/// at every x beyond it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -43,12 +43,13 @@ pub struct Sweep {
     pub reaches: PerTarget,
 }
 
-/// Fields at the start of all kinds of sweep messages. The list of the sender's farthest x follows at the end.
+/// Fields at the start of all kinds of sweep messages. The list of the sender's farthest x follows at the end of the
+/// message.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the other targets. A negative
-    /// sign marks a plain pass, in which every relay takes the farthest x that meets the target.
+    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the rest. A negative sign marks
+    /// a plain pass, in which every relay takes the farthest x that meets the target.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -144,8 +145,8 @@ pub struct SweepVerdict {
     /// x that the destination must take if a target is committed, m. `None` for the farthest x that the destination has
     /// reported for this target.
     pub required_x_m: Option<f32>,
-    /// True if the power or fixed altitude of some relay differs from the mission's common profile. This relay is the
-    /// sender or a later relay of the pass.
+    /// True if the sender or a later relay of the pass has a profile of its own. Its power or fixed altitude then
+    /// differs from the mission's common profile.
     pub own: bool,
 }
 
@@ -198,8 +199,8 @@ pub struct OwnSeat {
 /// List of relay profiles (altitude and power), by rising index of the relays.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles (altitude and power). In a pass it has those of the relays up to the sender, in
-/// the reply those of the whole chain.
+/// Message that collects relay profiles (altitude and power). The message of a pass has the profiles of the relays up
+/// to the sender, the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -256,7 +257,7 @@ impl Roster {
     }
 }
 
-/// Token message of Algorithm 2, in which relays improve their positions one after the other.
+/// Token message of Algorithm 2, in which the relays improve their positions in turn.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -298,17 +299,17 @@ impl Token {
     }
 }
 
-/// Action of each relay that receives the token of Algorithm 2.
+/// Action required of each relay that receives the token of Algorithm 2.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
     /// The relay stays, and only stores its neighbours' positions.
     Look,
-    /// The relay moves if another position has a better SIR.
+    /// The relay moves if a position with a better SIR than its current position exists.
     Move {
         /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Search method for a better position.
+        /// Search method for a position with a better SIR.
         local: Local,
     },
     /// The relay no longer moves, because Algorithm 2 has ended.
@@ -346,8 +347,7 @@ impl StepBody {
         }
     }
 
-    /// Returns the decoded action. `None` if a value is out of range, or if a number that the action does not use is
-    /// not 0.
+    /// Returns the decoded action. `None` if a value is out of range, or if an unused number is not 0.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
@@ -433,7 +433,7 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict those of the other relays; 0 for none. Its measurements are
+    /// Node number of a relay whose measurements contradict those of all other relays; 0 for none. Its measurements are
     /// left out of `sums`. Set in replies only.
     pub excluded: u16,
 }
@@ -498,7 +498,7 @@ impl EstimateBody {
     }
 }
 
-/// Measurement sums on the wire, as two arrays of nine numbers that are encoded one after the other.
+/// Measurement sums on the wire: two successive arrays of nine numbers.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {

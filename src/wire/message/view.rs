@@ -31,16 +31,16 @@ pub struct Poll {
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of the view `agreed` was polled. For the initial view the leader counts as the proposer.
-    /// With the proposer, exactly half of the members' votes are enough for a quorum.
+    /// True if the proposer of the view `agreed` was polled. For the initial view the leader counts as the proposer. If
+    /// the proposer was polled, exactly half of the members' votes are enough for a quorum.
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
     /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Until
     /// then relays must not use positions of the new view.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a polled member has accepted; `None` without such a view. It may be agreed on
-    /// already.
+    /// Latest view after `agreed` that a polled member has accepted; `None` if there is none. The chain may have agreed
+    /// on this view already.
     pub successor: Option<Successor>,
 }
 
@@ -58,13 +58,13 @@ impl Poll {
     }
 }
 
-/// View that a polled relay has accepted in an earlier decision. It may be agreed on already.
+/// View that a polled relay has accepted in an earlier decision. The chain may have agreed on this view already.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
     /// Identifier of the proposal on which the view was decided.
     pub proposal: ViewId,
-    /// Decided view: the proposed view, or an earlier view that was found to be decided already.
+    /// Decided view: the proposed view, or an earlier view that the vote has found to be decided already.
     pub view: View,
 }
 
@@ -276,7 +276,8 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader to a relay that is allowed to leave and to a relay that joins. Each lease renewal has them.
+/// Orders of the leader: to a relay that is allowed to leave, and to a relay that joins. Each lease renewal contains
+/// these orders.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
@@ -296,7 +297,8 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by relays that need to leave or would join. They are those from the last relay to the sender.
+/// Requests to the leader by relays that need to leave or are ready to join. They come from the relays between the last
+/// relay and the sender, both included.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
@@ -304,7 +306,7 @@ pub struct Requests {
     pub leaver: u16,
     /// Remaining endurance of the node `leaver`, s; 65535 if unknown, 0 if it has the order to leave.
     pub endurance_s: u16,
-    /// Node outside of the chain that would join it, 0 for none.
+    /// Node outside of the chain that is ready to join it, 0 for none.
     pub spare: u16,
     /// True if all relays from the last relay to the sender are at their positions.
     pub in_place: bool,
@@ -378,7 +380,7 @@ impl RenewalBody {
     /// Returns the nodes that leave and join, 0 for none.
     ///
     /// # Errors
-    /// [`MessageError::Value`] if a number is above 1000, or if two numbers are encoded that are both 0.
+    /// [`MessageError::Value`] if a number is above 1000, or if both numbers are 0 but `nodes` is not `None`.
     fn nodes(&self) -> Result<[u16; 2], MessageError> {
         let Some([a, b, c, d]) = self.nodes else {
             return Ok([0; 2]);

@@ -220,8 +220,8 @@ fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
 }
 
-/// Checks that replayed handshakes of many nodes evict no known node from the session table. They replace only entries
-/// of nodes that have not proved their presence.
+/// Checks that replayed handshakes of many nodes evict no known node from the session table. The handshakes replace
+/// only entries of nodes that have not proved their presence.
 #[test]
 fn recorded_handshakes_do_not_replace_known_nodes() {
     let mut handshakes = Vec::new();
@@ -337,8 +337,8 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks which frames under the relay's own number reveal another node with that number. Only a handshake with the
-/// same key, and with an epoch that is not older, reveals it.
+/// Checks which frames under the relay's own number reveal a second node with that number. Only a handshake with the
+/// same key, and with an epoch that is not older than the relay's, does.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -382,8 +382,8 @@ fn own_frames_are_recognised() {
     }
 }
 
-/// Checks that two nodes with the same number are detected. Node 1 accepts the node with the larger claim. Its reply
-/// to the node with the smaller claim contains the larger claim.
+/// Checks that two nodes with the same number are detected. Node 1 accepts the node with the larger claim. The reply of
+/// node 1 to the node with the smaller claim contains the larger claim.
 #[test]
 fn the_smaller_claim_receives_the_larger_one() {
     const FAR: u32 = 1 << 20;
@@ -427,9 +427,9 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks when the node with the smaller claim can replace another node of the same number. It is accepted once the
-/// node with the larger claim is silent. Recorded frames of the node with the larger claim are then rejected, until
-/// that node sends new frames.
+/// Checks when the node with the smaller claim can replace a node of the same number. The node with the smaller claim
+/// is accepted once the node with the larger claim is silent. Recorded frames of the node with the larger claim are
+/// then rejected, until that node sends new frames.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

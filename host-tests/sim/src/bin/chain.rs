@@ -113,7 +113,7 @@ const FRAME: Duration = Duration::from_millis(100);
 
 /// Runs the simulated chain `speed` times faster than real time, and shows it on `screen`.
 ///
-/// A computer that is too slow delays the virtual time.
+/// On a computer that is too slow, the virtual time falls behind.
 fn fly_live(chain: &mut Chain, view: &mut LiveView, screen: &Screen, speed: f64) {
     let micros = FRAME.mul_f64(speed).as_micros();
     let frame = uav_relay::Duration::from_micros(u64::try_from(micros).unwrap_or(u64::MAX));
@@ -170,7 +170,7 @@ fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     }
 }
 
-/// Duration of a run from which on its progress line is shown. Shorter runs show none.
+/// Minimum duration of a run after which its progress line is shown.
 const SILENT: Duration = Duration::from_secs(1);
 
 /// Minimum time between two updates of the progress line.
@@ -194,7 +194,7 @@ impl Progress {
         }
     }
 
-    /// Writes `text` to the progress line. Does nothing in a short run, and shortly after the last update.
+    /// Writes `text` to the progress line. Does nothing at the start of a run, and shortly after the last update.
     fn show(&mut self, text: impl FnOnce() -> String) {
         let elapsed = self.started.elapsed();
         let is_due = self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);
@@ -250,7 +250,8 @@ impl AirCapture {
         })
     }
 
-    /// Writes the frames whose transmission has ended to the capture file. With `to_the_end` it writes all frames.
+    /// Writes the frames whose transmission has ended to the capture file. If `to_the_end` is true, it writes all
+    /// frames.
     fn follow(&mut self, chain: &mut Chain, to_the_end: bool) -> Result<(), Failure> {
         let until = if to_the_end {
             uav_relay::Instant::from_micros(u64::MAX)

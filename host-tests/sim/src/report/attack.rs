@@ -17,12 +17,12 @@ pub struct AttackCountsReport {
     pub taken: u64,
     /// Number of the attacker's frames by the counter that they incremented at the receiver.
     ///
-    /// The counters are those of a relay. `received` counts accepted frames. Each other counter stands for a reason of
-    /// rejection.
+    /// The counters are those of a relay. `received` counts accepted frames. Each of the remaining counters stands for
+    /// a reason of rejection.
     pub counted: BTreeMap<&'static str, u64>,
 }
 
-/// Result of an attack, in comparison with the same run without it.
+/// Result of a run with an attack, in comparison with the same run without the attack.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AttackReport {
     /// True if the relays signed their frames.
@@ -31,17 +31,17 @@ pub struct AttackReport {
     pub forged: AttackCountsReport,
     /// Numbers of replayed frames: sent, accepted, and counted by the relays.
     pub replayed: AttackCountsReport,
-    /// True if the run with the attack ended for another reason than the run without the attack.
+    /// True if the runs with and without the attack ended for different reasons.
     pub ended_otherwise: bool,
-    /// Number of relays whose final position or target SIR differs from the run without the attack.
+    /// Number of relays whose final position or target SIR is not that of the run without the attack.
     pub moved: u64,
-    /// Largest distance, in x and altitude, that the attack moved a relay's final position, m.
+    /// Largest distance, in x and altitude, by which the attack moved a relay's final position, m.
     ///
     /// Absent if a moved relay has no position in one of the two runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest_m: Option<f64>,
-    /// Number of positions that relays accepted for target SIRs that do not occur without the attack. Each such
-    /// position shows that the attack misled a relay.
+    /// Number of accepted positions whose target SIR does not occur in the run without the attack. Each such position
+    /// shows that the attack misled a relay.
     pub misled: u64,
     /// Number of different views (memberships of the chain) that the relays accepted.
     pub formed: u64,
@@ -52,7 +52,7 @@ pub struct AttackReport {
 }
 
 impl AttackReport {
-    /// Compares the outcome of a run under attack with `calm`, the outcome of the same run without it.
+    /// Compares the outcome of a run under attack with `calm`, the outcome without the attack.
     ///
     /// `auth` is true if the relays signed their frames.
     pub fn new(auth: bool, outcome: &Outcome, calm: &Outcome) -> Self {
@@ -88,7 +88,7 @@ impl AttackReport {
         }
     }
 
-    /// Describes the harm done by the attack; `None` if there was none.
+    /// Describes the harm done by the attack; `None` if it did no harm.
     pub fn harm(&self) -> Option<String> {
         match (self.moved, self.ended_otherwise) {
             (0, false) => None,

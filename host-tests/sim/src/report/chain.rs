@@ -45,7 +45,7 @@ pub struct ChainReport {
     pub uavs: u16,
     /// Version of the mission that the chain flies at the end; 0 for the mission loaded before the start.
     ///
-    /// Absent without uploads. All SIRs of the report refer to this mission.
+    /// Absent if no mission was uploaded. All SIRs of the report refer to this mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Error message, if the run failed.
@@ -58,8 +58,8 @@ pub struct ChainReport {
     pub best_sir: Option<f64>,
     /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
     ///
-    /// If the mission also requires SIRs from Rx to Tx, these SIRs are divided by `reverse`, and the worst hop of
-    /// both directions counts.
+    /// If the mission also requires SIRs from Rx to Tx, the hops in that direction count, too. Their SIRs are first
+    /// divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the worst hop, dB: `sir` as decibels.
@@ -71,10 +71,11 @@ pub struct ChainReport {
     /// Target SIR that the relays agreed on, linear; absent without an agreement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// True if `target` is proven optimal. No chain of equal relays can exceed it by more than the tolerance.
+    /// True if `target` is proven optimal. No chain of relays with equal powers and altitudes can exceed it by more
+    /// than the tolerance.
     ///
-    /// In a random field the leader computes an upper bound on the SIR. False if this bound is higher than `target`:
-    /// then the optimum is unknown. Absent without a random field or a bound.
+    /// In a random field the leader computes an upper bound on the SIR. If this bound is higher than `target`, the
+    /// optimum is unknown, and the value is false. Absent if there is no random field or no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
     /// Linear SIR of the chain before the first round of Algorithm 2, and after each round. In a round of this
@@ -102,19 +103,20 @@ pub struct ChainReport {
     pub virtual_s: f64,
     /// Counts of link faults and of rejected frames.
     pub faults: FaultReport,
-    /// Failed relays, each with the neighbour that detected the failure.
+    /// Failed relays, each with a neighbour that detected the failure.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub silences: Vec<SilenceReport>,
     /// `shared` if all relays share one radio channel; absent for separate links between neighbours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
-    /// Number of relays on each side of a relay that receive its frames; absent for separate links.
+    /// Number of relays toward Tx, and toward Rx, that receive a relay's frames; absent for separate links.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reach: Option<usize>,
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// Availability of the chain, and further statistics. It is the fraction of the time with the best positions.
+    /// Availability of the chain, and further statistics. The availability is the fraction of the time in which the
+    /// relays have the best positions.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
     /// Replacement of drones with tired batteries; absent without `--fleet`.
@@ -125,7 +127,7 @@ pub struct ChainReport {
     pub listened: Option<SensingReport>,
     /// SIR of the worst hop with all interferers of the scenario.
     ///
-    /// Absent unless the relays compute with a single interferer in place of several.
+    /// Absent unless the scenario has several interferers, which the relays replace by a single one.
     #[serde(flatten)]
     pub against_all: Option<AllInterferersReport>,
     /// Number of relays in the chain at the end. Absent if the log, `timeline`, is empty.
@@ -134,7 +136,7 @@ pub struct ChainReport {
     /// Relays that are not in the chain at the end, with their last positions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<LostReport>,
-    /// Final positions of drones with simulated autopilots; empty without them.
+    /// Final positions of drones with simulated autopilots; empty if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drones: Vec<DroneReport>,
     /// Log of the run. It is empty if nothing happened except that relays accepted positions.
@@ -349,7 +351,7 @@ impl ChainReport {
         text
     }
 
-    /// Returns a line of text about the mission that the chain flies at the end; empty without uploads.
+    /// Returns a line of text about the mission that the chain flies at the end; empty without an upload.
     fn flown_text(&self) -> String {
         match self.version {
             None => String::new(),
@@ -373,9 +375,9 @@ impl ChainReport {
 
 /// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
 ///
-/// The chain is the largest view that all its relays have accepted. Without such a view, all relays that are on are
-/// returned. On separate links all relays are returned if one has failed. If no part of the chain has a quorum, the
-/// list is empty.
+/// The chain is the largest view that all its relays have accepted. If there is no such view, the result has all relays
+/// that are switched on. If relays on separate links have failed, the result has all relays. It is empty if no part of
+/// the chain has a quorum.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -398,7 +400,7 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if `part` has all relays of their view, in the order of their indices.
+/// Returns true if `part` contains all relays of one view, in the order of their indices.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)
@@ -444,8 +446,8 @@ pub(super) fn version(outcome: &Outcome) -> u16 {
     versions.max().unwrap_or(0)
 }
 
-/// Returns the error line of a failed run; `None` after success. If an uploaded mission was not adopted, the line
-/// states this.
+/// Returns the error line of a failed run; `None` after success. The line also states if an uploaded mission was not
+/// adopted.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
     // A mission counts as adopted even if its relays are lost.
@@ -457,7 +459,7 @@ pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     })
 }
 
-/// Returns the version of the newest mission that any relay adopted; 0 without such a mission.
+/// Returns the version of the newest mission that any relay adopted; 0 if there is none.
 fn adopted(outcome: &Outcome) -> u16 {
     let versions = outcome.moments.iter().map(|moment| match moment.what {
         TimelineEvent::Adopted(version) => version,
@@ -543,14 +545,14 @@ pub struct AvailabilityReport {
     pub first_agreement_s: Option<f64>,
     /// Fraction of the time since the first agreement in which the chain was available.
     ///
-    /// It is available while the longest chain that the living relays can form has the same positions as in a run
+    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
     /// without faults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub availability: Option<f64>,
     /// Longest outage since the first agreement, s: a time in which the chain was not available. See `availability`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_outage_s: Option<f64>,
-    /// Largest number of groups of relays that flew by separate agreements at the same time.
+    /// Largest number of groups of relays that flew at the same time, each by its own agreement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_flying: Option<usize>,
     /// Smallest distance of two relays during the run, m.
@@ -606,7 +608,7 @@ pub struct DroneReport {
     pub index: u16,
     /// True distance of the drone from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// True position of the drone to the right of the line from Tx to Rx, m.
+    /// True lateral offset of the drone, m; positive to the right as seen from Tx toward Rx.
     pub y_m: f64,
     /// True height of the drone above the ground, m.
     pub h_m: f64,
@@ -646,7 +648,8 @@ pub struct SilenceReport {
     pub at_s: f64,
 }
 
-/// Reports the neighbours that detected failed relays. False detections over bad links are left out.
+/// Reports the neighbours that detected failed relays. Failures that a neighbour wrongly detected over a bad link are
+/// left out.
 pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     let killed = |index: u16| {
         let at = usize::from(index).checked_sub(1);
@@ -686,7 +689,7 @@ pub struct AllInterferersReport {
     pub all_sir: f64,
     /// SIR of the worst hop with all interferers of the scenario, dB.
     pub all_sir_db: f64,
-    /// Relative loss of SIR by the assumption of a single interferer.
+    /// Relative loss of SIR because the relays assume a single interferer.
     ///
     /// It is 1 - `all_sir` / SIR with the single interferer. It is negative if the SIR with all interferers is
     /// higher.

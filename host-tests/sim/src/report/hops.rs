@@ -9,8 +9,8 @@ pub use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
 
 /// Returns the position of relay `index` for the target SIR `target`, linear.
 ///
-/// A relay stays short of its farthest x if other relays can then meet the target. `None` if the chain cannot meet it.
-/// `profile_of` returns the profile of relay 1..=N.
+/// A relay stops before its farthest x if later relays of the pass can meet the target only then. `None` if the chain
+/// cannot meet it. `profile_of` returns the profile of relay 1..=N.
 pub fn place(
     mission: &Mission,
     target: f32,
@@ -26,14 +26,14 @@ pub fn place(
     })
 }
 
-/// Position of a relay at the end of a run, and the SIR at which it receives.
+/// Position of a relay at the end of a run, and the SIRs of its hop to the previous node.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RelayReport {
     /// Number of the relay, from 1 next to Tx.
     pub index: u16,
     /// Distance of the relay from Tx along the line to Rx, m, measured on the ground.
     pub x_m: f64,
-    /// Distance of the relay from the line, m, positive to the right as seen toward Rx.
+    /// Lateral offset of the relay from the line Tx to Rx, m; positive to the right as seen from Tx.
     pub y_m: f64,
     /// Altitude of the relay, m.
     pub h_m: f64,
@@ -46,7 +46,7 @@ pub struct RelayReport {
     /// Absent if it is unknown, or if the mission requires no SIR from Rx to Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back: Option<f64>,
-    /// Version of the relay's mission; 0 for the mission loaded before the start. Absent without uploads.
+    /// Version of the relay's mission; 0 for the mission loaded before the start. Absent if no mission was uploaded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
 }
@@ -59,18 +59,19 @@ pub struct RelayReport {
 pub struct HopSlots {
     /// Number of the hop, from 1: hop k connects the nodes k - 1 and k of the chain. Node 0 is Tx.
     pub hop: usize,
-    /// Start and end of the slot in the direction to Rx.
+    /// Start and end of the slot for data toward Rx.
     pub slot: [f64; 2],
-    /// Start and end of the slot in the direction to Tx; absent without data in that direction.
+    /// Start and end of the slot for data toward Tx; absent if there are no such data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slot_back: Option<[f64; 2]>,
 }
 
 impl HopSlots {
-    /// Returns the slots of all hops from the times that the hops need for their data. `there` is for the direction
-    /// to Rx, `back` for the direction to Tx.
+    /// Returns the slots of all hops from the times that the hops need for their data. `there` has the times for data
+    /// toward Rx, `back` the times for data toward Tx.
     ///
-    /// `back` is empty for one direction. The result is empty if a time is infinite, because the hop carries no data.
+    /// `back` is empty if there are only data toward Rx. The result is empty if a time is infinite, because the hop
+    /// then carries no data.
     pub fn of(there: &[f64], back: &[f64]) -> Vec<Self> {
         let frame: f64 = there.iter().chain(back.iter().rev()).sum();
         let mut spent = 0.0;
@@ -138,7 +139,7 @@ pub struct LostReport {
     /// Last setpoint of the relay: distance from Tx along the line to Rx, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x_m: Option<f64>,
-    /// Last setpoint of the relay: distance from the line, m, positive to the right.
+    /// Last setpoint of the relay: lateral offset from the line Tx to Rx, m; positive to the right.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_m: Option<f64>,
     /// Last setpoint of the relay: altitude, m.
@@ -149,7 +150,7 @@ pub struct LostReport {
     pub version: Option<u16>,
     /// Reason why the relay is not in the chain.
     ///
-    /// `silent`: the relay is off. `apart`: the relay is on, but cannot reach the other relays. `no quorum`: the
+    /// `silent`: the relay is off. `apart`: the relay is on, but cannot reach the relays of the chain. `no quorum`: the
     /// relay is on, but no chain is left.
     pub why: &'static str,
 }
@@ -165,7 +166,7 @@ pub struct WorstBack {
     pub worst_back_db: f64,
     /// Linear SIR of the hop from Rx to the last relay.
     pub rx_sir_back: f64,
-    /// Linear SIR of the worst hop of both directions; SIRs from Rx to Tx are divided by `reverse`.
+    /// Linear SIR of the worst hop toward Rx or Tx; SIRs from Rx to Tx are divided by `reverse`.
     pub worst_both: f64,
     /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. SIRs from Rx to Tx are
     /// divided by `reverse` before they are compared.
@@ -175,7 +176,7 @@ pub struct WorstBack {
 impl WorstBack {
     /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
     ///
-    /// `None` if the mission requires no SIR from Rx to Tx, or without hops.
+    /// `None` if the mission requires no SIR from Rx to Tx, or if there are no hops.
     pub fn of(mission: &Mission, there: &[f64], back: &[f64]) -> Option<Self> {
         let reverse = f64::from(mission.config().reverse);
         if reverse > 0.0 {
@@ -187,7 +188,8 @@ impl WorstBack {
 
     /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
     ///
-    /// `reverse` is the SIR that hops to Tx need, as a fraction of the SIR that hops to Rx need. `None` without hops.
+    /// `reverse` is the SIR that hops to Tx need, as a fraction of the SIR that hops to Rx need. `None` if there are no
+    /// hops.
     pub fn with(reverse: f64, there: &[f64], back: &[f64]) -> Option<Self> {
         let worst = |sirs: &[f64]| sirs.iter().copied().reduce(f64::min);
         let (worst_there, worst_back) = (worst(there)?, worst(back)?);
@@ -203,8 +205,8 @@ impl WorstBack {
     }
 }
 
-/// Relative difference up to which the worst SIRs of both directions count as equal. It is 0.004 dB, larger than the
-/// rounding errors.
+/// Relative difference up to which the worst SIR toward Rx and that toward Tx count as equal. The difference is 0.004
+/// dB, more than the rounding errors.
 const EQUAL: f64 = 1e-3;
 
 /// Returns the name of the direction with the lower SIR: `forward`, `backward`, or `both` if equal. `there` is the
@@ -236,10 +238,10 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
         .collect()
 }
 
-/// Formats the relays of the chain, lost relays and Rx as a table. With `room` it has a y column.
+/// Formats the relays of the chain, lost relays and Rx as a table. If `room` is true, it has a y column.
 ///
-/// With `rx_sir_back` it also has the SIRs from Rx to Tx. The row of a relay then has the SIR at which the previous
-/// node receives this relay.
+/// If `rx_sir_back` is given, it also has the SIRs from Rx to Tx. The row of a relay then has the SIR at which the
+/// previous node receives this relay.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

@@ -60,10 +60,10 @@ pub struct RotationFigures {
     /// Time of the closest approach, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest_at_s: Option<f64>,
-    /// The two nearest drones at the time `nearest_at_s`.
+    /// The two drones that were nearest to each other, at the time `nearest_at_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest: Option<[NearDrone; 2]>,
-    /// Largest number of chains that flew by agreements of their own at the same time.
+    /// Largest number of chains that flew at the same time, each by its own agreement.
     pub chains: usize,
 }
 
@@ -97,7 +97,8 @@ impl RotationFigures {
 impl RotationReport {
     /// Creates the report from one run with announced departures and one without.
     ///
-    /// The second value of each pair is the largest number of chains that flew by separate agreements at the same time.
+    /// The second value of each pair is the largest number of chains that flew at the same time, each by its own
+    /// agreement.
     pub fn new(
         spec: &RotationSpec,
         announced: (&Rotated, usize),

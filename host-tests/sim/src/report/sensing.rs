@@ -22,7 +22,8 @@ pub struct BelievedReport {
     pub power_w: f32,
     /// Estimated position along the line from Tx to Rx, m.
     pub x_m: f32,
-    /// Estimated position to the right of the line, m. The sign is arbitrary if relays never left the line.
+    /// Estimated lateral offset, m; positive to the right of the line Tx to Rx as seen from Tx. The sign is arbitrary
+    /// if relays never left the line.
     pub y_m: f32,
 }
 
@@ -40,7 +41,7 @@ pub struct SensingReport {
     /// Linear SIR that the relays reach if they know the interferer; only for a single interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimum_sir: Option<f64>,
-    /// Ratio of the true SIR at the end to the SIR with a known interferer: `true_sir` / `optimum_sir`.
+    /// Ratio of `true_sir`, the SIR at the end, to `optimum_sir`, the SIR with a known interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share_of_optimum: Option<f64>,
     /// Mean of `share_of_optimum`, true SIR / optimum SIR, over all measurements since the first agreement.

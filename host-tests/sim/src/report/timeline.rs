@@ -31,7 +31,7 @@ pub struct MomentReport {
     /// autopilots `engaged`, `released`, `blind`, `restarted`; of relays that measure `new estimate`, `interferer
     /// unclear`, `sensor off`.
     pub what: &'static str,
-    /// Other node that the event concerns, for example a lost or found neighbour; absent if there is none.
+    /// Second node that the event concerns, for example a lost or found neighbour; absent if none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other: Option<u16>,
     /// Number of the view (membership of the chain) that the relay accepted.
@@ -121,7 +121,7 @@ pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
     moments.iter().map(MomentReport::of).collect()
 }
 
-/// Log entries of several relays about the same event. They form one line of text.
+/// Log entries of several relays about the same event, which are shown as one line of text.
 #[derive(Clone, PartialEq, Debug)]
 struct Group {
     first_s: f64,
@@ -396,7 +396,7 @@ pub struct RecoveryReport {
     pub lost: Vec<u16>,
     /// Relays in this view (membership of the chain) that were not in the previous view, by number from 1.
     pub back: Vec<u16>,
-    /// Version of an uploaded mission that the chain first flies in this view. Absent without such a mission.
+    /// Version of an uploaded mission that the chain first flies in this view. Absent if there is no such mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Time when the upload of the mission `version` began, s; absent without an upload.
@@ -404,7 +404,7 @@ pub struct RecoveryReport {
     pub offered_s: Option<f64>,
     /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
     ///
-    /// If there are several such events, it is the first event that concerns a lost or a returned relay.
+    /// If there are several such events, it is the time of the first one that concerns a lost or a returned relay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
     /// Time when a neighbour first detected that a relay was lost or had returned, s.
@@ -412,7 +412,7 @@ pub struct RecoveryReport {
     pub detected_s: Option<f64>,
     /// Time when the last relay of the view (membership of the chain) accepted it, s.
     pub formed_s: f64,
-    /// Time when all relays of the view had new positions, s; absent if another view came first.
+    /// Time when all relays of the view had new positions, s; absent if a newer view came earlier.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged_s: Option<f64>,
     /// Number of passes and view proposals from the detection, or from the upload, to convergence.
@@ -426,7 +426,7 @@ pub struct RecoveryReport {
 struct View {
     number: u32,
     members: BTreeSet<u16>,
-    /// Indices in the log of the first and the last relay's acceptance of the view.
+    /// Indices of two log entries: the first and the last acceptance of the view by a relay.
     span: (usize, usize),
 }
 
@@ -533,7 +533,7 @@ fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant>
     gone.into_iter().chain(come).min()
 }
 
-/// Returns the first log entry in which a relay detects the loss or return of another relay.
+/// Returns the first log entry in which a relay detects that a relay was lost or has returned.
 ///
 /// `lost` and `back` are the numbers of lost and returned relays.
 fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
@@ -578,7 +578,7 @@ fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant))
         .sum()
 }
 
-/// Formats a line for each view with lost or returned relays or a new mission. Other views are only counted.
+/// Formats a line for each view with lost or returned relays or a new mission. All further views are only counted.
 pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
     let mut text = String::new();
     let mut same = 0;

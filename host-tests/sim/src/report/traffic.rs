@@ -17,7 +17,7 @@ const SHOWN: usize = 16;
 /// value for the direction to Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficReport {
-    /// Promised data rates, bit/s, for each direction: by the planner's formula at the first agreement.
+    /// Data rates, bit/s, for each direction, that the planner's formula gives at the first agreement.
     pub promised_bps: Vec<f64>,
     /// Data rates of the packets that the sources created, bit/s, for each direction.
     pub offered_bps: Vec<f64>,
@@ -50,7 +50,7 @@ pub struct TrafficDetails {
     /// Text about how the hops share frequencies and time.
     #[serde(skip)]
     sharing: String,
-    /// True if the lengths of the time slots are fitted to the hops' data rates in both directions.
+    /// True if the lengths of the time slots are fitted to the hops' data rates toward Rx and toward Tx.
     #[serde(skip)]
     fits_both: bool,
 }
@@ -64,7 +64,7 @@ pub struct FlowReport {
     pub until_s: f64,
     /// Number of packets that the source created.
     pub offered_packets: u64,
-    /// Number of packets that arrived at the other end of the chain.
+    /// Number of packets that arrived at their destination, Rx or Tx.
     pub delivered_packets: u64,
     /// Number of packets that were dropped because a queue was full.
     pub dropped_packets: u64,
@@ -121,12 +121,12 @@ pub struct PeriodReport {
     pub missing_packets: Vec<u64>,
     /// Median delays of the packets that arrived in this period, s, for each direction.
     ///
-    /// Absent if none arrived in one of the directions.
+    /// Absent if no packet arrived in one of the directions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub delay_median_s: Vec<f64>,
     /// Delays that 99 % of the packets that arrived in this period do not exceed, s, for each direction.
     ///
-    /// Absent if none arrived in one of the directions.
+    /// Absent if no packet arrived in one of the directions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub delay_99_s: Vec<f64>,
 }

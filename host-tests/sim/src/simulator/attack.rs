@@ -20,8 +20,8 @@ use super::faults::LinkSpec;
 
 /// Attack on the chain: number of frames of each kind, and time of the last frame.
 ///
-/// The attacker does not know the network key. Half of the frames are sent back to back from the start of the run,
-/// the others at random times.
+/// The attacker does not know the network key. One half of the frames is sent back to back from the start of the run,
+/// the other half at random times.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Attack {
     /// Number of forged frames that the attacker sends.
@@ -72,8 +72,8 @@ const ATTACKER: u64 = 2;
 /// Largest number of frames that the attacker records; it discards the oldest.
 const MEMORY: usize = 65_536;
 
-/// Number of random picks of a recorded frame before the attacker gives up. A pick fails if the frame has not arrived
-/// at its receiver yet.
+/// Number of random picks of a recorded frame, after which the attacker gives up. A pick fails if the frame has not
+/// arrived at its receiver yet.
 const TRIES: usize = 64;
 
 impl Attacker {
@@ -186,8 +186,8 @@ pub(super) struct ForgedRoute {
 
 /// Returns a frame forged by a random method. `heard` is a recorded frame, if any.
 ///
-/// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a
-/// valid CRC, handshake with a guessed tag, handshake of a relay with another key.
+/// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a valid
+/// CRC, handshake with a guessed tag, handshake of a relay with a wrong key.
 pub(super) fn forge(
     mission: &Mission,
     way: ForgedRoute,
@@ -215,7 +215,7 @@ pub(super) fn forge(
 
 /// Changes one random byte of a frame: in the frame counter, the body or the tag.
 ///
-/// The first eight bytes stay as they are.
+/// The first eight bytes are not changed.
 fn with_altered_byte(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(HEADER - 2..plain.len().max(HEADER));
     if let Some(byte) = plain.get_mut(at) {
@@ -226,7 +226,7 @@ fn with_altered_byte(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
 
 /// Returns a false message, well-formed and without a tag.
 ///
-/// It is a changed copy of the recorded frame `heard` if that is suitable; otherwise it is made up.
+/// It is a changed copy of the recorded frame `heard` if that is suitable, otherwise an invented message.
 fn false_message(
     mission: &Mission,
     way: ForgedRoute,
@@ -237,7 +237,7 @@ fn false_message(
     copy.unwrap_or_else(|| random_message(mission, way, rng))
 }
 
-/// Returns a copy of a recorded frame with false values. Its pass number is the same or slightly higher.
+/// Returns a copy of a recorded frame with false values. The pass number of the copy is the same or slightly higher.
 ///
 /// `None` unless the frame is a message that relays pass along the whole chain, or a reply to one.
 fn altered_copy(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
@@ -350,7 +350,7 @@ fn random_message(mission: &Mission, way: ForgedRoute, rng: &mut ChaCha8Rng) -> 
     frame.get(..len).unwrap_or_default().to_vec()
 }
 
-/// Returns a forged upload: a newer mission with another interferer.
+/// Returns a forged upload: a newer mission in which the interferer is different.
 ///
 /// `None` unless the mission has an interferer, as missions with a random field cannot be uploaded.
 fn forged_upload(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {

@@ -33,7 +33,8 @@ use ground::{Station, stations};
 use judge::ChangedRelays;
 pub use live::LiveRelay;
 
-/// Largest number of events in a run. It ends runs in which the relays never settle, after some minutes of computing.
+/// Largest number of events in a run. This limit ends runs in which the relays never agree on positions, after some
+/// minutes of computing.
 const MAX_EVENTS: u64 = 400_000_000;
 
 impl Chain {
@@ -79,7 +80,7 @@ impl Chain {
         self.update_statistics(changed);
     }
 
-    /// Passes `samples` interference samples to every living relay that has a setpoint.
+    /// Gives `samples` interference samples to every living relay that has a setpoint.
     ///
     /// `draw` returns a random sample, W, at a position.
     pub fn measure(
@@ -330,7 +331,7 @@ struct Member {
     /// Outgoing serial lines: the first toward Tx or to a shared channel, the second toward Rx.
     lines: [Line; 2],
     killed: Option<Instant>,
-    /// True if the relay controlled its drone at the last time step of the flight.
+    /// True if the relay controlled its drone at the previous time step of the flight.
     under_relay_control: bool,
     starts: u32,
     /// Number of passes and view proposals that the relay began before its last start.
@@ -342,7 +343,7 @@ struct Member {
     record: Option<ViewRecord>,
     /// Last setpoint that [`Chain::check`] found within the limits, so that it is not checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of all setpoints since the relay last got its first one. With a guard, a
+    /// Smallest and largest coordinates of all setpoints since the relay last had none. If the relay has a guard, a
     /// setpoint may be outside of the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
@@ -397,7 +398,7 @@ pub struct Chain {
 struct Start {
     /// Number of the relay that starts, from 1.
     index: u16,
-    /// Number of this start of the relay, from 1. With signed frames it is also the epoch.
+    /// Number of this start of the relay, from 1. If frames are signed, this number is also the epoch.
     number: u32,
     seed: u32,
     now: Instant,
@@ -449,7 +450,7 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults, whose positions are the reference for the statistics.
+    /// `run` simulates a fault-free chain, whose positions are the reference for the statistics.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -590,7 +591,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
     Ok(members)
 }
 
-/// Queues the restarts of autopilots, and the landings of drones that a pilot never hands back.
+/// Queues the restarts of autopilots, and the landings of drones whose pilot never hands them back.
 ///
 /// Returns the number of these events.
 fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
@@ -646,15 +647,15 @@ pub enum QueuedEvent {
     Kill,
     /// The relay is switched on again.
     Boot,
-    /// The relay requests to leave the chain, with this remaining endurance, s.
+    /// The relay requests to leave the chain. The field is its drone's remaining endurance, s, if known.
     Leave(Option<u16>),
-    /// The relay gets its drone's endurance beyond the way home, s.
+    /// The relay is told its drone's remaining endurance beyond the way home, s.
     Endurance(u16),
     /// The relay cancels its departure.
     Stay,
     /// A partition or a one-way link failure begins or ends.
     Partition,
-    /// A radio on the shared channel reaches its next step, such as the end of a frame.
+    /// An event of a radio on the shared channel is due, such as the end of a frame.
     ///
     /// The event's relay index is unused.
     Air(AirEvent),

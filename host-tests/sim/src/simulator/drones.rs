@@ -6,7 +6,7 @@ use uav_relay::{Duration, Instant, Placement};
 
 use uav_relay_scenario::number::narrow;
 
-/// Position along the line from Tx to Rx, to its right, and above the ground, m.
+/// Position [x, y, height], m. x is from Tx toward Rx, y to the right as seen from Tx.
 pub type Point = [f64; 3];
 
 /// Converts a relay's placement to a position in f64.
@@ -114,7 +114,7 @@ impl Body {
         sum(self.at, braked)
     }
 
-    /// Moves the body toward `goal` for `step_s` seconds, with this speed and acceleration at most.
+    /// Moves the body toward `goal` for `step_s` seconds, with at most this speed and acceleration.
     pub fn fly(&mut self, goal: Point, speed_mps: f64, acceleration_mps2: f64, step_s: f64) {
         let axes = self.at.iter_mut().zip(&mut self.velocity_mps);
         for ((at, velocity), goal) in axes.zip(goal) {
@@ -137,7 +137,7 @@ impl Body {
     }
 }
 
-/// Closest approach of two drones: which two, how near, and when.
+/// Closest approach of two drones: the drones, their distance, and the time.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
     /// Smallest distance of the two drones, m.
@@ -188,7 +188,7 @@ pub(super) struct Drone {
 }
 
 impl Drone {
-    /// Moves the drone toward its goal for `step_s` seconds. It navigates by its own position estimate.
+    /// Moves the drone toward its goal for `step_s` seconds. The drone navigates by its own position estimate.
     pub(super) fn fly(&mut self, step_s: f64) {
         let goal = sum(self.goal, self.bias.map(|part| -part));
         self.body
@@ -291,7 +291,7 @@ pub(super) fn sum(one: Point, other: Point) -> Point {
     [x + more_x, y + more_y, h + more_h]
 }
 
-/// Returns the distance of two points, m.
+/// Returns the distance between two points, m.
 pub fn apart(one: Point, other: Point) -> f64 {
     let [x, y, h] = one;
     let [other_x, other_y, other_h] = other;

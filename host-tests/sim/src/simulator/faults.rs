@@ -7,7 +7,7 @@ use rand::RngExt;
 use uav_relay::wire::frame::MAX_SWEEP;
 use uav_relay::{Duration, Instant};
 
-/// Probability of each fault of a frame, 0 to 0.9. Faults are independent: several may hit one frame.
+/// Probability of each fault of a frame, 0 to 0.9. Faults are independent: one frame may have several.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
     /// Probability that a frame never arrives.
@@ -103,12 +103,13 @@ impl Faults {
     }
 }
 
-/// Model of bursts of losses (Gilbert-Elliott): each direction of a link is in a good or a bad state.
+/// Model of bursts of losses (Gilbert-Elliott). Each direction of a link is in a good or a bad state.
 ///
 /// In the bad state the link loses all frames, in the good state no frames.
 #[derive(Debug)]
 pub struct Bursts {
-    /// Mean fraction of frames that the link loses, 0 to 1. It equals the fraction of frames that find the link in its bad state.
+    /// Mean fraction of frames that the link loses, 0 to 1. This is also the fraction of frames that find the link in
+    /// its bad state.
     share: f64,
     /// Probability that a link in the good state is in the bad state for the next frame.
     worsens: f64,
@@ -123,7 +124,7 @@ pub struct Bursts {
 impl Bursts {
     /// Creates the model for a mean fraction `share` of lost frames, 0 to 0.9.
     ///
-    /// The mean length of a burst is `length` frames, at least [`Bursts::shortest`].
+    /// `length` is the mean length of a burst, frames: at least [`Bursts::shortest`].
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {
@@ -136,7 +137,7 @@ impl Bursts {
 
     /// Returns the mean number of successive losses if each frame is lost with the probability `share`.
     ///
-    /// It is the shortest mean burst that [`Bursts::new`] accepts.
+    /// The result is the smallest mean length that [`Bursts::new`] accepts.
     pub fn shortest(share: f64) -> f64 {
         1.0 / (1.0 - share)
     }
@@ -203,14 +204,14 @@ impl LinkSpec {
         Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain. It includes 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain. The time includes 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let frame = self.line_time(MAX_SWEEP).as_micros();
         Duration::from_micros(frame + self.latency.as_micros() + 1_000)
     }
 }
 
-/// Serial line that sends one frame after the other. It knows until when it is busy.
+/// Serial line that sends one frame after the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
     free: Instant,

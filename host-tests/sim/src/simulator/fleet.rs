@@ -19,10 +19,10 @@ pub struct Takeover {
     pub from: Instant,
     /// End of the takeover; `None` if it is permanent.
     ///
-    /// At the end the pilot hands the drone back to its relay, as soon as the drone hovers and no other drone moves
+    /// After the end the pilot hands the drone back to its relay, as soon as the drone hovers and no second drone moves
     /// nearby.
     pub until: Option<Instant>,
-    /// Position to which the pilot flies the drone: along the run's line, to its right and up, m.
+    /// Position to which the pilot flies the drone, m: x from Tx toward Rx, y to the right, and height.
     ///
     /// `None` to climb in place.
     pub to: Option<Point>,
@@ -50,7 +50,7 @@ pub struct FleetSpec {
 }
 
 impl FleetSpec {
-    /// Returns the autopilot of drone `index` (from 0): PX4 and ArduCopter in turn.
+    /// Returns the autopilot of drone `index` (from 0): PX4 for even numbers, ArduCopter for odd ones.
     const fn kind(index: usize) -> Kind {
         if index.is_multiple_of(2) {
             Kind::Px4
@@ -60,7 +60,7 @@ impl FleetSpec {
     }
 }
 
-/// Returns a geographic line of `distance_m` metres at an arbitrary place. It is for a scenario without such a line.
+/// Returns a geographic line of `distance_m` metres at an arbitrary place. Used for a scenario without such a line.
 ///
 /// The line leads eastward from 47.4 N, 8.54 E. `None` if no line can have this length.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
@@ -102,7 +102,7 @@ const AWAY: Duration = Duration::from_millis(3_000);
 /// The autopilot reports both once a second.
 const MODE_KNOWN_WITHIN: Duration = Duration::from_millis(1_500);
 
-/// Height that a pilot climbs after taking a drone over, to leave the chain, m.
+/// Height by which a drone climbs after its pilot has taken it over, so that it leaves the chain, m.
 const ASIDE_M: f64 = 15.0;
 
 /// Value of MAVLink's `MAV_LANDED_STATE` for a drone on the ground.
@@ -140,7 +140,7 @@ pub(super) struct Vehicle {
     goal: Point,
     /// Height at which the pilot first hands the drone to its relay, m.
     climbs_to_m: f64,
-    /// True while the pilot of this drone sees no other drone moving nearby.
+    /// True while the pilot sees no drone that moves near this drone.
     pub(super) is_clear: bool,
     last_target_at: Option<Instant>,
     /// True while a PX4 is in its failsafe. The PX4 resumes OFFBOARD once it receives a stream of targets.
@@ -210,7 +210,7 @@ impl Vehicle {
         })
     }
 
-    /// Returns the geographic line to which the relay's positions relate. An upload may have moved it.
+    /// Returns the geographic line from Tx to Rx of the relay's mission. An upload may have moved this line.
     fn line(&self) -> Axis {
         let moved = self.sites.and_then(|sites| Axis::between(sites).ok());
         moved.unwrap_or(self.spec.axis)
@@ -259,7 +259,7 @@ impl Vehicle {
         self.landed == IN_AIR && self.mode != Mode::Manual && self.is_not_taken_over(now)
     }
 
-    /// Restarts the autopilot in flight. It is silent for the time [`AWAY`].
+    /// Restarts the autopilot in flight. The autopilot is silent for the time [`AWAY`].
     pub(super) fn restart(&mut self, now: Instant) {
         self.away_until = Some(now + AWAY);
         self.mode = Mode::Hold;
@@ -546,14 +546,14 @@ impl Pilot {
         self.hands_over_at = self.hands_over_at.max(Some(looked));
     }
 
-    /// Plans another hand-over to the relay, after a restart of the autopilot or the relay, or a failsafe.
+    /// Plans a new hand-over to the relay, after a restart of the autopilot or the relay, or a failsafe.
     fn schedule_hand_over_after_restart(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * RECOVERS_S));
     }
 
     /// Returns the flight mode that the pilot selects now; `None` to keep the present mode.
     ///
-    /// `may_hand_over` is false while this drone moves, or another drone moves near it.
+    /// `may_hand_over` is false while this drone moves, or a drone near it moves.
     fn selected_mode(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
         if self.has_control(now) {
             // Schedule a hand-over after the takeover.
@@ -567,14 +567,14 @@ impl Pilot {
         None
     }
 
-    /// Returns the position to which the pilot flies the drone, m. `None` without a takeover now, and if the pilot
+    /// Returns the position to which the pilot flies the drone, m. `None` if there is no takeover now, or if the pilot
     /// climbs in place.
     fn flies_to(&self, now: Instant) -> Option<Point> {
         let during = |it: &&Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
         self.takeovers.iter().find(during)?.to
     }
 
-    /// Plans another hand-over after the autopilot has rejected the flight mode.
+    /// Plans a new hand-over after the autopilot has rejected the flight mode.
     fn schedule_retry(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * LOOKS_S));
     }

@@ -37,7 +37,7 @@ pub struct Sent {
     pub heard_by: Vec<usize>,
     /// Number of nodes in range that did not receive the frame.
     ///
-    /// Either another frame overlapped with this frame at the node, or the node's own radio was sending or turning to
+    /// Either a second frame overlapped with this frame at the node, or the node's own radio was sending or turning to
     /// sending.
     pub missed: usize,
 }
@@ -49,7 +49,7 @@ enum Reception {
     Collided,
     /// The node does not receive the frame, because its own radio sends or turns to sending.
     ///
-    /// Frames whose sender is switched off during the transmission count here, too.
+    /// Also used if the sender is switched off during the transmission.
     Unheard,
 }
 
@@ -68,7 +68,7 @@ pub struct Medium {
     link: LinkSpec,
     radios: Vec<Radio>,
     on_air: Vec<OnAir>,
-    /// Random-number generator of the back-offs alone, so that they do not change other random draws.
+    /// Random-number generator that is used only for back-offs, so that they change no other random draws.
     rng: ChaCha8Rng,
     counts: AirCounts,
 }
@@ -98,7 +98,7 @@ impl Medium {
         self.counts
     }
 
-    /// Returns the time that a frame of `bytes` bytes occupies the channel, with its preamble.
+    /// Returns the time for which a frame of `bytes` bytes, with its preamble, occupies the channel.
     pub fn air_time(&self, bytes: usize) -> Duration {
         self.link.line_time(HEADER + bytes)
     }
@@ -329,7 +329,7 @@ pub const OVERHEAD: usize = HEADER + TURNAROUND;
 
 /// Unit of the random wait before sending, in byte times: `aUnitBackoffPeriod`, 20 symbols.
 ///
-/// It is longer than the turnaround, so a radio that senses in a later slot finds the sender.
+/// It is longer than the turnaround, so a radio that senses the channel in a later slot detects the sender.
 pub const SLOT: usize = 10;
 
 /// Back-off exponent of a radio's first wait for a free channel, `macMinBE`: 0 to 2^3 - 1 slots.
@@ -350,8 +350,8 @@ pub struct AirCounts {
     pub sent: u64,
     /// Number of receptions lost because frames overlapped.
     pub collided: u64,
-    /// Number of receptions lost because the receiver was sending or turning to sending. Receptions from a node that
-    /// is switched off while it sends count, too.
+    /// Number of receptions lost because the receiver was sending or turning to sending. Receptions also count here if
+    /// their sender was switched off during the transmission.
     pub unheard: u64,
     /// Number of times that a node found the channel busy and waited again.
     pub deferred: u64,

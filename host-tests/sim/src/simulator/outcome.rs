@@ -15,8 +15,8 @@ use super::route::Track;
 use super::true_interference::Snapshot;
 use super::watch::ObservedState;
 
-/// Kind of an event in the log of a run, about one relay. If two nodes are concerned, [`Moment::other`] is the other
-/// node.
+/// Kind of an event in the log of a run, about one relay. If the event concerns a second node, [`Moment::other`] is
+/// that node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TimelineEvent {
     /// The relay was switched off: it neither sends nor receives.
@@ -42,15 +42,15 @@ pub enum TimelineEvent {
     NoQuorum,
     /// The relay's lease expired: the relay may no longer rely on the last agreement.
     LeaseLapsed,
-    /// Another node reports that it does not receive the relay.
+    /// A node reports that it does not receive this relay.
     NotHeard,
-    /// The relay found that another node has a different mission.
+    /// The relay found that a node's mission is not the relay's own.
     MissionMismatch,
-    /// The relay found that another node signs its frames with a different key.
+    /// The relay found that a node does not sign its frames with the relay's key.
     KeyMismatch,
-    /// The relay found that another node's epoch, a counter of its starts, went back.
+    /// The relay found that a node's epoch, the counter of that node's starts, went back.
     EpochWentBack,
-    /// Two nodes use the index [`Moment::other`], which is this relay's or a neighbour's.
+    /// Two nodes use the index [`Moment::other`], which is this relay's index or a neighbour's.
     DuplicateIndex,
     /// The relay accepted its position in an agreement of the chain.
     Converged,
@@ -60,9 +60,9 @@ pub enum TimelineEvent {
     Partitioned,
     /// The partition between this relay and the next relay toward Rx ends.
     PartitionEnded,
-    /// The relay stops receiving another node.
+    /// The relay stops receiving the node [`Moment::other`].
     Deaf,
-    /// The relay receives another node again.
+    /// The relay receives the node [`Moment::other`] again.
     Hears,
     /// A ground station offers a mission of this version. Tx counts as relay 0, Rx as the relay after the last.
     Offered(u16),
@@ -82,7 +82,7 @@ pub enum TimelineEvent {
     NewEstimate,
     /// The relay found that the measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The relay found that the measurements of one node do not agree with the other nodes.
+    /// The relay found that the measurements of one node do not agree with those of all other nodes.
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
@@ -101,7 +101,7 @@ pub struct Moment {
     pub relay: u16,
     /// Kind of the event, with its data.
     pub what: TimelineEvent,
-    /// Other node that the event concerns, such as a lost neighbour, by number from 1.
+    /// Second node that the event concerns, such as a lost neighbour, by number from 1.
     pub other: Option<u16>,
     /// Linear target SIR of the relay's position at this time; `None` without a target.
     pub target: Option<f32>,
@@ -136,8 +136,8 @@ pub struct RelayEnd {
     pub setpoint: Option<Placement>,
     /// Linear target SIR of the setpoint; `None` without a target.
     pub target: Option<f32>,
-    /// Upper bound, linear, on the SIR of the worst hop that any chain at the relays' altitudes can reach. `None`
-    /// except at the leader.
+    /// Upper bound, linear, on the SIR of all chains at the relays' altitudes. Known only at the leader, otherwise
+    /// `None`.
     pub bound: Option<f32>,
     /// Shares of the frame time for the relay's fitted slots; `None` with equal slots.
     pub slot_shares: Option<SlotShares>,
@@ -171,16 +171,16 @@ pub struct Watched {
     pub first_agreement: Option<Instant>,
     /// Fraction, 0 to 1, of the time since the first agreement in which the chain was available.
     ///
-    /// It is available while the longest chain that the living relays can form has the same positions as in a run
+    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
     /// without faults. `None` unless the run has a fixed end.
     pub availability: Option<f64>,
     /// Longest outage since the first agreement: a time in which the chain was not available.
     ///
     /// `None` unless the run has a fixed end.
     pub longest_wrong: Option<Duration>,
-    /// Largest number of groups of relays that flew by separate agreements at the same time.
+    /// Largest number of groups of relays that flew at the same time, each by its own agreement.
     pub most_flying: usize,
-    /// Minimum distance of two relays during the run, m. The distance is between their drones if drones are
+    /// Minimum distance between two relays during the run, m. The distance is between their drones if drones are
     /// simulated, otherwise between their setpoints.
     pub least_separation_m: Option<f64>,
 }
@@ -222,21 +222,22 @@ pub struct Outcome {
     pub nearest_lent: Option<Nearest>,
     /// Smallest margin during the run, m: the distance of two drones minus the required distance.
     ///
-    /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
-    /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
+    /// Only drones in flight that no pilot controls count. The required distance is the mission's separation, or the
+    /// distance between the drones when their pilots last handed them over, if that is smaller. Infinite if no pair
+    /// counted.
     pub margin_m: f64,
     /// Relays that forward data at each time step: number from 1, and true position of the drone.
     ///
-    /// Recorded for drones without autopilots if [`Setup::track`](super::setup::Setup::track) is set. These are the living relays with a
-    /// setpoint, without spares and relays that may leave.
+    /// Recorded for drones without autopilots if [`Setup::track`](super::setup::Setup::track) is set. Included are the
+    /// living relays with a setpoint, except spares and relays that may leave.
     pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
     /// Two drones, their distance, and the time of the smallest margin, `margin_m`.
     pub margin_at: Option<Nearest>,
-    /// Number of position targets that relays sent while the autopilot accepted none, as on the ground.
+    /// Number of position targets that relays sent while the autopilot accepts none, such as on the ground.
     ///
     /// Targets up to 1.5 s after the change of the state do not count. Nonzero is a bug.
     pub stray_targets: u64,
-    /// Final position of each drone with an autopilot, and true if the relay controls it.
+    /// Final position of each drone with an autopilot, and a flag: true if the relay controls the drone.
     ///
     /// The position is relative to the line of the relay's mission, which an upload may move.
     pub fleet: Vec<(Point, bool)>,
@@ -255,7 +256,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Returns the smallest distance of two drones during the run, m; infinite if no flight was simulated.
+    /// Returns the smallest distance between two drones in the run, m; infinite if no flight was simulated.
     pub fn nearest_m(&self) -> f64 {
         self.nearest
             .map_or(f64::INFINITY, |nearest| nearest.apart_m)

@@ -47,7 +47,7 @@ const MOVED_M: f64 = 0.1;
 /// Distance, m, within which a drone has arrived at its agreed position.
 const THERE_M: f64 = 5.0;
 
-/// Duration of the periods in which moving interferers count as fixed, ps: 1 s.
+/// Duration of the periods within which a moving interferer is taken to be at rest, ps: 1 s.
 const FIXED: Ps = 1_000_000 * MICRO;
 
 /// Converts a virtual time to picoseconds since the start of the run.
@@ -55,10 +55,10 @@ pub const fn ps(instant: Instant) -> Ps {
     instant.as_micros().saturating_mul(MICRO)
 }
 
-/// State of a relay that determines the route of the data and its rates.
+/// State of a relay, from which the route of the data and its rates are computed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
-    /// State of the relay, with the position of its drone as `place`. Without simulated drones it is the setpoint.
+    /// State of the relay. Its `place` is the position of the drone or, if no drones are simulated, the setpoint.
     ///
     /// The position is `None` while the relay has no setpoint.
     pub observed: ObservedState,
@@ -67,7 +67,7 @@ pub struct RelayState {
 }
 
 impl RelayState {
-    /// Returns true if both states are equal except for details that do not affect the route.
+    /// Returns true if the two states are equal except for details that do not affect the route.
     ///
     /// Movements below [`MOVED_M`] and the lease do not affect it.
     fn is_like(&self, other: &Self) -> bool {
@@ -104,7 +104,7 @@ impl Track {
         }
     }
 
-    /// Returns this record with other positions: relay 1 gets the first of `places`, relay 2 the second.
+    /// Returns this record with new positions: relay 1 gets the first of `places`, relay 2 the second.
     ///
     /// The further relays follow in order. Positions are x, y and altitude, m. A state in which a relay has no position
     /// is not changed.
@@ -126,7 +126,7 @@ impl Track {
 /// Computation of the true SIR of every hop, from the true interference.
 #[derive(Debug)]
 pub struct TrueHops {
-    /// Relays and interferers at time 0, and the interferers' velocity along and beside the line, m/s.
+    /// Relays and interferers at time 0, and the interferers' velocity along x and y, m/s.
     ///
     /// `None` in a random field and in a run with uploads.
     scene: Option<(Scene, [f64; 2])>,
@@ -213,7 +213,7 @@ impl TrueHops {
     }
 }
 
-/// Recurring time slot of a hop: the same part of every TDMA frame. In a TDMA frame each hop has one slot.
+/// Recurring time slot of a hop: the same part of every TDMA frame. In each TDMA frame a hop has one slot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Window {
     /// Start of the first TDMA frame of the link, ps.
@@ -298,7 +298,7 @@ pub struct Period {
     pub state: ChainState,
     /// Data rates at the agreed positions by the planner's formula, bit/s: to Rx, then back to Tx.
     ///
-    /// Empty without an agreement; the second is absent if data goes only to Rx.
+    /// Empty if there is no agreement. The second value is absent if data goes only to Rx.
     pub promised_bps: Vec<f64>,
 }
 
@@ -340,7 +340,8 @@ struct Members {
 }
 
 impl Members {
-    /// Returns the relays of the view that most living relays have accepted. Of several such views it is the newest.
+    /// Returns the relays of the view that most living relays have accepted. If there are several such views, it is the
+    /// newest.
     fn of(states: &BTreeMap<usize, RelayState>) -> Option<Self> {
         let on = || states.iter().filter(|(_, state)| state.observed.is_on);
         let mut counts: BTreeMap<(ViewId, u16), usize> = BTreeMap::new();
@@ -373,7 +374,8 @@ impl Members {
 
     /// Returns the number (from 0) and the present position of each relay in the view.
     ///
-    /// A relay without a position gets an arbitrary one, which has no effect, because its hops carry no data.
+    /// A relay without a position gets an arbitrary one. This position has no effect, because the relay's hops carry no
+    /// data.
     fn places(&self) -> Vec<(usize, Point)> {
         let place = |(index, member): (usize, &Option<(usize, RelayState)>)| {
             let known = member.and_then(|(relay, state)| Some((relay, state.observed.place?)));
@@ -395,7 +397,7 @@ impl Members {
             .collect()
     }
 
-    /// Returns each relay's number (from 0) and agreed position; `None` unless all have one target SIR.
+    /// Returns each relay's number (from 0) and agreed position; `None` unless their target SIRs are equal.
     ///
     /// `None` also while relays are at positions that serve only to measure an unknown interferer: these have no target
     /// SIR.
@@ -418,7 +420,7 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction. They are assigned anew at each agreement and for each new view
+/// Time slots of all hops, for each direction. The slots are assigned anew at each agreement and for each new view
 /// (membership).
 struct Layout {
     view: ViewId,
@@ -461,7 +463,7 @@ impl DataLink {
         }
     }
 
-    /// Returns true if the lengths of the time slots are fitted to the hops' data rates in both directions.
+    /// Returns true if the lengths of the slots are fitted to the hops' data rates toward Rx and toward Tx.
     pub fn is_fitted_to_both(&self) -> bool {
         self.radio.link.access == Access::Fitted && self.reverse > 0.0
     }

@@ -15,7 +15,7 @@ use super::medium::Access;
 use super::rotation::RotationSpec;
 use super::true_interference::TrueInterference;
 
-/// Period in which relays 1 to `after` and the other relays do not receive each other.
+/// Period in which relays 1 to `after` and the relays beyond `after` do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Partition {
     /// Number, from 1, of the relay after which the partition cuts the chain.
@@ -45,7 +45,7 @@ pub struct UploadSpec {
     pub upload: Upload,
 }
 
-/// Data rate and number of users of a link or a radio channel.
+/// Data rate of a link or radio channel, the number of relays that share it, and a frame's overhead.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Channel {
     /// Data rate of the link or the channel, bit/s.
@@ -98,7 +98,7 @@ pub struct Setup {
     pub reserve: Option<Duration>,
     /// Values of a drone's remaining endurance beyond the way home, as given to its relay.
     ///
-    /// Each has the relay's number from 1, the time, and the endurance, s.
+    /// Each entry has the relay's number from 1, the time, and the endurance, s.
     pub endurances: Vec<(u16, Instant, u16)>,
     /// Relays that wait outside of the chain from the start until the leader calls them, by number from 1.
     pub spares: Vec<u16>,
@@ -106,10 +106,10 @@ pub struct Setup {
     pub partitions: Vec<Partition>,
     /// True if relays sign frames, with a key drawn from the seed. The epoch counts the starts of a relay.
     pub auth: bool,
-    /// Uploads of missions during the run. Without `auth` no upload takes place, because uploads must be signed.
+    /// Uploads of missions during the run. If `auth` is false, no upload takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
-    /// Ends of the chain whose ground stations request reports from the relays, each with its start. Without `auth` no
-    /// station requests reports.
+    /// Ends of the chain whose ground stations request reports from the relays, each with its start. If `auth` is
+    /// false, no station requests reports.
     pub watches: Vec<(Side, Instant)>,
     /// Numbers, from 1, of relays that lose an uploaded mission at a reboot.
     pub forgetful: Vec<u16>,
@@ -129,7 +129,7 @@ pub struct Setup {
     ///
     /// Otherwise it is at least [`Bursts::shortest`](super::faults::Bursts::shortest).
     pub burst: f64,
-    /// One-way link failures: periods in which one relay does not receive another relay.
+    /// One-way link failures: periods in which relay `by` does not receive relay `of`.
     pub deaf: Vec<OneWayFailure>,
     /// True interferers, which relays measure and have to locate; `None` if relays do not measure them.
     pub true_interference: Option<TrueInterference>,
@@ -152,7 +152,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Default of [`Self::radio_reach`]: a relay receives up to four relays on each side.
+    /// Default of [`Self::radio_reach`]: a relay receives four relays toward Tx and four toward Rx.
     pub const RADIO_REACH: usize = 4;
 
     /// Creates the setup of a fault-free run of `mission`, with default settings, default links and seed 1.
@@ -215,7 +215,7 @@ impl Setup {
         self
     }
 
-    /// Returns the data rate and the number of users of the links or the channel.
+    /// Returns the data rate, relays in range, and frame overhead of the run's links or shared channel.
     pub fn channel(&self) -> Channel {
         let near = match self.settings.wiring {
             Wiring::Pair => 1,
@@ -235,7 +235,7 @@ impl Setup {
         }
     }
 
-    /// Returns the number of relays that share the channel within radio range, and a frame's overhead.
+    /// Returns the load of the shared channel: the number of relays in radio range, and a frame's overhead.
     ///
     /// `None` if senders do not interfere with each other: on separate lines and on an ideal channel.
     pub fn load(&self) -> Option<ChannelLoad> {
@@ -249,7 +249,7 @@ impl Setup {
         })
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain. It includes 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain. The time includes 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let latency = Duration::from_micros(self.link.latency.as_micros() + 1_000);
         self.load().map_or(self.link.hop_time(), |load| {
@@ -257,7 +257,7 @@ impl Setup {
         })
     }
 
-    /// Returns the network key and the epoch of a relay at its `start`-th start. `None` without `auth`.
+    /// Returns the network key and the epoch of a relay at its `start`-th start. `None` if `auth` is false.
     pub fn proof(&self, start: u32) -> Option<Auth> {
         self.secret().map(|secret| Auth {
             key: Key::new(secret),

@@ -24,8 +24,8 @@ use std::fmt;
 use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
-/// Number of packets that are sent after the end of a run without a set end. The data rates that the report states
-/// are then averages over many packets.
+/// Number of packets that are sent after the end of a run, if the run ends by itself. The data rates that the report
+/// states are then averages over many packets.
 const AFTER: usize = 1_000;
 /// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;
@@ -76,12 +76,12 @@ impl fmt::Display for TrafficError {
 
 impl std::error::Error for TrafficError {}
 
-/// Numbers of packets: created, and by outcome (delivered, dropped, or lost with a relay).
+/// Numbers of packets: created, delivered, dropped, and lost with a relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Packets {
     /// Number of packets that the source created.
     pub offered: u64,
-    /// Number of packets that arrived at the other end of the chain.
+    /// Number of packets that arrived at their destination, Rx or Tx.
     pub delivered: u64,
     /// Number of packets that were dropped because a queue was full.
     pub dropped: u64,
@@ -252,7 +252,8 @@ struct Queue {
     /// Slot time that the first packet still needs, ps, as of `since`; 0 before its transmission starts.
     rest: Ps,
     since: Ps,
-    /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
+    /// Number of the node's present transmission. Scheduled ends of transmissions with a different number are out of
+    /// date, and are ignored.
     number: u32,
     /// Integral of the queue's length over time until `counted`, in packets times ps. The report computes the mean
     /// length from it.
@@ -284,8 +285,8 @@ impl Queue {
 
     /// Replaces the hop on which the node sends, from `now` on.
     ///
-    /// If the receiver stays the same, the rest of the first packet is sent at the new rate. Otherwise the whole
-    /// packet is sent again.
+    /// If the receiver stays the same, the rest of the first packet is sent at the new rate. If the receiver changes,
+    /// the whole packet is sent again.
     fn change(&mut self, hop: Option<Hop>, now: Ps) {
         self.rest = match (self.hop, hop) {
             (Some(old), Some(new)) if old.to == new.to && self.rest > 0 => {
@@ -301,8 +302,8 @@ impl Queue {
     }
 }
 
-/// End of a packet's transmission: time, order, node, and number of the transmission. If several end at the same
-/// time, `order` puts the node first that is nearest to the destination of the packets.
+/// End of a packet's transmission: time, order, node, and number of the transmission. If several transmissions end at
+/// the same time, the node nearest to the packets' destination has the lowest `order`.
 type End = Reverse<(Ps, usize, usize, u32)>;
 
 /// Simulation of the traffic in one direction, while it runs.

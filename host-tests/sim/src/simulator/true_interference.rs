@@ -12,7 +12,7 @@ use uav_relay_scenario::scene::{Place, Scene};
 pub struct TrueInterference {
     /// Relays, channel and true interferers, with the interferers' positions at time 0.
     pub scene: Scene,
-    /// Velocity of all interferers: along the line from Tx to Rx and to its right, m/s.
+    /// Velocity of all interferers along x (from Tx to Rx) and y (to the right as seen from Tx), m/s.
     pub velocity_mps: [f64; 2],
     /// Number of independent power samples that a relay averages for a measurement.
     pub samples: u32,
@@ -31,8 +31,8 @@ pub struct TrueInterference {
     pub ends_during: [Instant; 2],
     /// True if Tx and Rx measure the interference, too.
     ///
-    /// With a network key they send the results by radio. Without one, only the measurement at Rx arrives, by a wire
-    /// to the last relay.
+    /// If there is a network key, they send the results by radio. Otherwise only the measurement at Rx arrives, by a
+    /// wire to the last relay.
     pub ends: bool,
     /// Time of the last measurement, which ends the run.
     pub until: Instant,
@@ -40,7 +40,7 @@ pub struct TrueInterference {
     pub seed: u64,
 }
 
-/// Measuring receiver that reports wrong powers from some time on.
+/// Measuring receiver that reports wrong powers from the time `since` on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrokenReceiver {
     /// Number of the node with the wrong receiver: a relay from 1, 0 for Tx, N + 1 for Rx.
@@ -156,8 +156,8 @@ impl TrueInterference {
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
     }
 
-    /// Returns the shadowing of the interference at `at`, in standard deviations. All points of a cube of edge [`SHADOW_M`] have the same
-    /// value.
+    /// Returns the shadowing of the interference at `at`, as a multiple of its standard deviation. All points of a cube
+    /// of edge [`SHADOW_M`] have the same value.
     #[expect(clippy::cast_possible_truncation, reason = "a number of a cell")]
     fn shadow(&self, at: Place) -> f64 {
         use rand::SeedableRng as _;

@@ -10,7 +10,7 @@ pub use super::outcome::Watched;
 use super::outcome::{Ending, Outcome};
 use super::setup::Setup;
 
-/// Statistics of a run: availability of the chain, groups of flying relays, least distance of relays.
+/// Statistics of a run: availability of the chain, groups of flying relays, distance between relays.
 #[derive(Debug)]
 pub struct Watch {
     pub(super) states: Vec<ObservedState>,
@@ -31,7 +31,7 @@ pub struct Watch {
 impl Watch {
     /// Starts the statistics of a run with the relays' states `seen`.
     ///
-    /// `run` simulates a chain without faults, whose positions are the reference.
+    /// `run` simulates a fault-free chain, whose positions are the reference.
     pub fn new(seen: Vec<ObservedState>, run: Run) -> Self {
         Self {
             last_setpoints: vec![None; seen.len()],
@@ -64,7 +64,8 @@ impl Watch {
         }
     }
 
-    /// Replaces the state of relay `at` (from 0) and updates the smallest distance. Returns true on a change.
+    /// Replaces the state of relay `at` (from 0) and updates the smallest distance. Returns true if the state has
+    /// changed.
     pub fn record_state(&mut self, at: usize, seen: ObservedState) -> bool {
         let Some(known) = self.states.get_mut(at) else {
             return false;
@@ -94,8 +95,8 @@ impl Watch {
         }
     }
 
-    /// Updates the number of groups that fly by separate agreements, and the time of the first agreement. All changes
-    /// of states at `now` must be recorded before.
+    /// Updates the number of relay groups with separate agreements, and the time of the first agreement. All changes of
+    /// states at `now` must be recorded before.
     pub fn count_groups(&mut self, now: Instant) {
         self.most_flying = self.most_flying.max(groups(&self.states));
         if self.first.is_none() && has_agreed(&self.states) {
@@ -105,7 +106,7 @@ impl Watch {
 
     /// Records `is_right`: true if the chain counts as available from now on.
     ///
-    /// It is available while the longest chain that the living relays can form has the same positions as in a run
+    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
     /// without faults.
     pub fn set_available(&mut self, is_right: bool) {
         if self.is_right && !is_right {
@@ -116,8 +117,8 @@ impl Watch {
 
     /// Returns the statistics up to `now`. They include the availability only if `is_judged` is true.
     ///
-    /// `flown_m` is the smallest distance of simulated drones, m. If it is `None`, because no drones are simulated,
-    /// the smallest distance of setpoints is used.
+    /// `flown_m` is the smallest distance of simulated drones, m. It is `None` if no drones are simulated; the smallest
+    /// distance between setpoints is then used.
     pub fn end(mut self, now: Instant, is_judged: bool, flown_m: Option<f64>) -> Watched {
         self.count_time(now);
         let share = self.first.map_or(0.0, |first| {
@@ -142,7 +143,7 @@ pub struct ObservedState {
     pub phase: Phase,
     /// View of the relay: the membership of the chain that it has accepted.
     pub view: ViewId,
-    /// True while the relay may rely on the last agreement: its lease is valid by its own clock.
+    /// True while the relay may rely on the last agreement: its lease is valid by the relay's clock.
     pub leased: bool,
     /// Number of relays in the relay's view (membership of the chain).
     pub relays: u16,
@@ -182,7 +183,7 @@ impl ObservedState {
     }
 }
 
-/// Returns the number of groups of relays that each fly by an agreement of their own.
+/// Returns the number of groups of relays that fly, each by its own agreement.
 ///
 /// A group consists of the relays of one view with valid leases. If relays of a view claim the same index, they are
 /// in different groups. A partition does not split a group whose agreement is still valid.
@@ -211,14 +212,14 @@ pub fn has_agreed(seen: &[ObservedState]) -> bool {
 
 /// Largest number of chains that [`longest`] returns.
 ///
-/// If many links are missing, there can be far more chains of the same length, and to examine all would take too
+/// If many links are missing, there can be far more chains of the same length. To examine all of them would take too
 /// long.
 const MAX_CHAINS: usize = 1_000;
 
 /// Returns the largest number of relays that can form a chain, and the chains of that many relays.
 ///
 /// `on` lists the usable relays in ascending order, from 0. `links(a, b)` returns true if relays a < b can be
-/// neighbours. Only chains whose relays all satisfy `with` are returned, at most 1000.
+/// neighbours. Only chains whose relays all satisfy `with` are returned, and at most 1000 chains.
 pub fn longest(
     on: &[usize],
     links: impl Fn(usize, usize) -> bool,
@@ -322,7 +323,7 @@ mod tests {
     }
 }
 
-/// Largest distance of two positions that count as equal, m.
+/// Largest distance between two positions that count as equal, m.
 const SAME_M: f64 = 1e-3;
 
 /// Positions of a chain's relays, in order from Tx; `None` if the chain did not settle.
@@ -331,7 +332,7 @@ pub type Places = Option<Vec<Point>>;
 /// Function that runs a simulated chain to its end; `None` if a relay rejects its settings.
 pub type Run = fn(Setup) -> Option<Outcome>;
 
-/// Cache of the positions that chains reach without faults, by their relays and mission version.
+/// Cache of the positions that chains reach without faults. The key is the relays and the mission version.
 #[derive(Debug)]
 pub struct Optima {
     run: Run,
@@ -347,7 +348,7 @@ impl Optima {
         }
     }
 
-    /// Returns true if `places` are the positions that the relays `nodes` (from 1) reach without faults.
+    /// Returns true if `places` are the positions that a fault-free run of the relays `nodes` reaches.
     ///
     /// `version` is the version of their mission. False if a position is missing.
     pub fn is_met(
@@ -409,7 +410,7 @@ pub fn places_of(outcome: &Outcome) -> Places {
     (outcome.ending == Ending::Settled).then(|| places.collect())?
 }
 
-/// Returns the positions in which a chain of only the relays `nodes` (from 1) settles without faults.
+/// Returns the positions in which a fault-free chain of only the relays `nodes` (from 1) settles.
 ///
 /// `version` is the version of the mission that they fly.
 pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {

@@ -103,7 +103,8 @@ impl Canvas {
         ));
     }
 
-    /// Draws a relay as a circle with a tooltip. No other shape is a circle, so that tests can count relays.
+    /// Draws a relay as a circle with a tooltip. No symbol of any other object is a circle, so that tests can count
+    /// relays.
     ///
     /// `rim` is the width of the outline.
     pub(super) fn relay(
@@ -121,7 +122,8 @@ impl Canvas {
         ));
     }
 
-    /// Draws the symbol of a relay, or a dot, as a path. It is no circle, because tests count circles as relays.
+    /// Draws the symbol of a relay, or a dot, as a path. It is a path and not a circle, because tests count circles as
+    /// relays.
     pub(super) fn disc(&mut self, (x, y): Point, radius: f64, class: &str) {
         let [x, y, r] = [x - radius, y, radius].map(short);
         let turn = short(2.0 * radius);
@@ -189,7 +191,7 @@ fn short(value: f64) -> f64 {
     }
 }
 
-/// Escapes text for XML. Control characters and others that XML 1.0 excludes are replaced by U+FFFD.
+/// Escapes text for XML. Characters that XML 1.0 excludes, such as control characters, are replaced by U+FFFD.
 fn escape(words: &str) -> String {
     let mut out = String::with_capacity(words.len());
     for c in words.chars() {
@@ -225,7 +227,8 @@ impl Scale {
         Self { from, to }
     }
 
-    /// Returns the picture coordinate of `value`. A value outside the scale gets the coordinate of the nearer end.
+    /// Returns the picture coordinate of `value`. A value outside the scale gets the coordinate of the nearer end of
+    /// the scale.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = ((value - self.from.0) / (self.from.1 - self.from.0)).clamp(0.0, 1.0);
         self.to.0 + share * (self.to.1 - self.to.0)
@@ -394,8 +397,7 @@ impl Labels {
     }
 }
 
-/// Estimates the width of a text in picture units, for the font size `size`. The estimate is rather too wide than too
-/// narrow.
+/// Estimates the width of a text in picture units, for the font size `size`. The estimate tends to be too wide.
 ///
 /// It takes the mean width of a character in a wide sans-serif font.
 pub(super) fn width(words: &str, size: f64) -> f64 {

@@ -130,18 +130,18 @@ const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
 const SIZE: f64 = 10.0;
 
-/// Largest lateral offset of an interferer in the view from above, relative to the relays' limit.
+/// Largest lateral offset of an interferer in the view from above, as a multiple of the relays' limit.
 ///
 /// An interferer farther away is an arrow at the edge.
 const FARTHEST: f64 = 2.0;
 
 /// Lateral extent of the view from above toward an interferer that is too far away to show.
 ///
-/// It is a fraction of the distance from Tx to Rx, and leaves space for an arrow. It applies if relays must stay on the
-/// line, because there are no lateral limits to show then.
+/// The extent is a fraction of the distance from Tx to Rx, and leaves space for an arrow. It is used if relays must
+/// stay on the line, because the view then shows no lateral limits.
 const TOWARD_FAR: f64 = 0.4;
 
-/// Draws the view from above. `side` has the scale along the line; `view` has the relays' lateral offsets.
+/// Draws the view from above. `side` has the scale of x in the side view; `view` has the relays' lateral offsets.
 fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, view: &LateralView) {
     let xs = picture.nodes.iter().map(|(x, _)| *x);
     let ys = view.y_m.iter().copied().chain(std::iter::repeat(f64::NAN));
@@ -182,7 +182,7 @@ fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, view: &Later
 
 /// Returns the vertical scale of the view from above.
 ///
-/// It includes the relays, the lateral limits for them, and the interferers that are not too far away.
+/// It includes the relays, their lateral limits, and the interferers that are not too far away.
 fn upright(seen: &Picture, view: &LateralView) -> Scale {
     let (mut low, mut high) = (view.least_m.min(0.0), view.most_m.max(0.0));
     let reach = if view.is_line() {

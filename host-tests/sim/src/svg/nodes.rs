@@ -131,11 +131,11 @@ const FEW: usize = 21;
 pub(super) struct Hop {
     number: usize,
     line: [Point; 2],
-    /// SIR of the hop in the worse of its directions, dB; `None` if it is unknown.
+    /// SIR of the hop in its worse direction of data, dB; `None` if it is unknown.
     decibels: Option<f64>,
-    /// SIRs of the hop in the direction to Rx and in the direction to Tx, dB; `None` if unknown.
+    /// SIRs of the hop for data toward Rx and for data toward Tx, dB; `None` if unknown.
     ways: [Option<f64>; 2],
-    /// True if the picture shows SIRs of both directions, to Rx and back to Tx.
+    /// True if the picture shows the SIRs for data toward Rx and for data toward Tx.
     has_back: bool,
     colour: (&'static str, f64),
     silent: bool,
@@ -204,7 +204,7 @@ pub(super) fn draw_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) 
 
 /// Writes the SIRs of the hops where there is free space.
 ///
-/// The worst hop comes first, then the first and the last hop, then the others.
+/// The worst hop has priority, then the first and the last hop, then all others.
 pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     let last = hops.last().map_or(0, |hop| hop.number);
     let lowest = hops.iter().filter_map(|hop| hop.decibels).reduce(f64::min);
@@ -252,9 +252,9 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
 
 /// Returns possible positions for the text with a hop's SIR, the best first.
 ///
-/// Each has a point on the hop, to which a line can lead. `width` and `height` are the size of the text. `shares` are
-/// the points as fractions of the hop's length; `sides` are additional distances from the hop, whose sign selects the
-/// side.
+/// Each position has a point on the hop, to which a line can lead. `width` and `height` are the size of the text.
+/// `shares` are the points as fractions of the hop's length; `sides` are additional distances from the hop, whose sign
+/// selects the side.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);

@@ -26,9 +26,9 @@ pub struct Picture {
     pub title_method: String,
     /// Distance from Tx to Rx, m, above 0.
     pub distance_m: f64,
-    /// Interferers: transmit power, W, and position x along the line and y to its right, m.
+    /// Interferers: transmit power, W, x from Tx toward Rx, m, and y to the right as seen from Tx, m.
     pub interferers: Vec<(f64, f64, f64)>,
-    /// Earlier or estimated interferers, in the form of `interferers`. They are drawn faintly.
+    /// Earlier or estimated interferers, in the format of `interferers`. They are drawn faintly.
     pub others: Vec<(f64, f64, f64)>,
     /// Kind of the interferers in `others`: of the mission before an upload, or estimated.
     pub others_are: OtherInterferers,
@@ -38,8 +38,7 @@ pub struct Picture {
     pub lateral_view: Option<LateralView>,
     /// Linear SIR of every hop from Tx to Rx. A hop is grey if its value is not finite and positive.
     pub hop_sir: Vec<f64>,
-    /// Linear SIR of every hop in the direction to Tx, the hop next to Tx first. Empty if only the direction to Rx
-    /// counts.
+    /// Linear SIR of every hop for data toward Tx, the hop next to Tx first. Empty if there are only data toward Rx.
     pub hop_sir_back: Vec<f64>,
     /// SIR that hops need toward Tx, as a fraction (0 to 1) of the SIR that they need toward Rx.
     pub reverse: f64,
@@ -99,7 +98,7 @@ impl LateralView {
     }
 }
 
-/// Returns the contents of a view from above; `None` if it would show nothing beside the line.
+/// Returns the contents of a view from above; `None` if it would show only the line from Tx to Rx.
 ///
 /// The contents are the lateral limits in `mission` and the relays' lateral offsets `y_m`, m. `None` if relays must
 /// stay on the line and no near interferer is beside it.
@@ -151,8 +150,8 @@ pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
 
-/// Returns the linear SIR of hop `number`, from 1, in its worse direction; `None` without such a hop. SIRs in the
-/// direction to Tx are divided by `reverse` before they are compared.
+/// Returns the linear SIR of hop `number`, from 1, in its worse direction; `None` without such a hop. SIRs for data
+/// toward Tx are divided by `reverse` before they are compared.
 pub(super) fn counted(picture: &Picture, number: usize) -> Option<f64> {
     let at = number.checked_sub(1)?;
     let there = picture.hop_sir.get(at).copied()?;
@@ -176,7 +175,7 @@ pub(super) fn is_gone(picture: &Picture, number: usize) -> bool {
     picture.lost.contains(&number) || picture.left_out.contains(&number)
 }
 
-/// Returns true if `x`, m, is between Tx and Rx or outside by at most a fifth of `distance`, m.
+/// Returns true if `x` is from -0.2 to 1.2 times `distance`, the distance from Tx to Rx, m.
 ///
 /// The x axis of the picture then includes it.
 pub(super) fn near(x: f64, distance: f64) -> bool {

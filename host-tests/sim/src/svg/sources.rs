@@ -1,4 +1,4 @@
-//! Interferers: markers on the ground if they are beside the chain, else arrows toward them.
+//! Interferers: symbols on the ground if they are within the plot, else arrows toward them.
 
 use super::canvas::{Area, Canvas, Frame, Labels, Point, width};
 use super::picture::{LEFT, OtherInterferers, Picture, RIGHT, TOP, length, near};
@@ -8,13 +8,14 @@ const SIZE: f64 = 10.0;
 /// Distance between two lines of text in labels of interferers, in picture units.
 const LINE: f64 = 12.0;
 
-/// Largest number of interferers that each have a label. If there are more, they have one label together.
+/// Largest number of interferers that each have a label. If there are more interferers, all of them have one common
+/// label.
 const CROWD: usize = 8;
 
 /// Largest number of lines of text about interferers outside the plot.
 const FAR_LINES: usize = 4;
 
-/// Interferer: transmit power, W, and position x along the line and y to its right, m.
+/// Interferer: transmit power, W, x from Tx toward Rx, m, and y to the right as seen from Tx, m.
 type Source = (f64, f64, f64);
 
 /// Splits interferers into two lists: within the plot, and outside. Values that are not finite are left out.
@@ -52,7 +53,7 @@ pub(super) fn diamond((x, y): Point) -> [Point; 4] {
     [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
 }
 
-/// Returns an arrow for an interferer that is above or below the range of the view from above.
+/// Returns an arrow for an interferer outside of the vertical range of the view from above.
 ///
 /// `down` is true at the lower edge of the view, where the arrow points down, and false at the upper edge.
 fn arrow((x, y): Point, down: bool) -> [Point; 3] {
@@ -112,7 +113,7 @@ pub(super) fn label_others(
     }
 }
 
-/// Labels the interferers in the side view. Other labels near the ground must be placed before.
+/// Labels the interferers in the side view. All other labels near the ground must be placed before this call.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (mut inside, _) = sorted(&picture.interferers, length(picture));
     let ground = frame.h.at(0.0);

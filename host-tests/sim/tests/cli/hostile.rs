@@ -240,7 +240,7 @@ fn an_overloaded_channel_is_refused_before_flight() {
 
 /// Checks that a channel that is too slow for fifty relays in range of each other is rejected.
 ///
-/// The error names settings that would suffice. With the longer probing interval that it names, the run is accepted.
+/// The error names settings that would suffice. With the longer `probe_after` that it names, the run is accepted.
 #[test]
 fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";

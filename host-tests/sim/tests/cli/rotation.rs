@@ -4,7 +4,7 @@ use super::json;
 
 /// Minimum separation of the default scenario, m.
 const SEPARATION_M: f64 = 4.0;
-/// Bound on the error of a reported position per axis, m: constant and random part.
+/// Bound on the error of a reported position per axis, m: sum of the constant and the random part.
 const ERROR_M: f64 = 0.8;
 
 #[test]

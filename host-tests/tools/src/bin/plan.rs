@@ -192,7 +192,7 @@ fn planned_by(
     }
 }
 
-/// Returns the report of a request for a data rate that no number of relays carries.
+/// Returns the report on a requested data rate that no number of relays carries.
 fn slower(rates: Option<RateReport>, options: &Options) -> PlanReport {
     let error = rates.as_ref().map(too_fast).unwrap_or_default();
     let why = Why::Plain(error);
@@ -203,7 +203,7 @@ fn slower(rates: Option<RateReport>, options: &Options) -> PlanReport {
     .with_rates(rates)
 }
 
-/// Result of planning: the plan, the number that was requested, and the data rates.
+/// Result of planning: the plan, the requested number of relays, and the data rates.
 struct Planned {
     /// Planned positions; `None` if no number of relays carries the requested data rate.
     plan: Option<Plan>,
@@ -354,7 +354,7 @@ fn companion(options: &Options) -> Result<Companion, Failure> {
     Ok(sections.companion)
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan is refused, if it is.
+/// Returns the terrain below `plan`, and the reason for a refusal; `None` if the plan is not refused.
 ///
 /// Draws the terrain for `--profile`.
 fn terrain(
@@ -385,7 +385,7 @@ fn terrain(
     Ok((Some(report), problem.or(missed)))
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan cannot be flown, if there is one.
+/// Returns the terrain below `plan`, and the reason why the plan cannot be flown; `None` if it can.
 fn over(
     options: &Options,
     elevation: &Elevation,
@@ -633,7 +633,7 @@ impl Options {
 
     /// Returns the requested number of relays, or the target SIR of the request.
     ///
-    /// For a requested data rate it is 1 relay; the real number is found later.
+    /// For a requested data rate the result is 1 relay; the planner replaces this number later.
     fn number(&self) -> Number {
         let wanted = &self.wanted;
         match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {
@@ -710,7 +710,7 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the reason why the no-fly areas forbid the plan; `None` if they do not.
+/// Returns the reason why the scenario's no-fly areas forbid the plan; `None` if they do not.
 fn no_fly(options: &Options, scenario: &Scenario, plan: &Plan) -> Option<String> {
     let chain: Vec<_> = plan.places.iter().map(|(place, _)| *place).collect();
     let is_free = options.altitude == Altitude::Free;
@@ -870,7 +870,7 @@ struct Flying {
     /// Text with the next command for the user; empty without `--out`.
     next: String,
     flight: Option<Flight>,
-    /// Reason why the flight over terrain was not simulated; `None` if it was, or without terrain.
+    /// Reason why the flight over terrain was not simulated; `None` if it was, or if there is no terrain.
     unknown: Option<String>,
     /// Reason why the relays cannot fly over the terrain; `None` if none was found.
     problem: Option<String>,
@@ -1034,7 +1034,7 @@ fn write_out(
 
 /// Loads the sections `[network]`, `[companion]` and `[ground]` of the scenario file.
 ///
-/// Another number of relays than `relays` in `[network]` is an error.
+/// It is an error if `[network]` has a number of relays other than `relays`.
 fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Deployment::default());

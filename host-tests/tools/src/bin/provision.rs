@@ -34,7 +34,7 @@ struct Asked<'a> {
     uavs: u16,
     method: Method,
     tolerance: f64,
-    /// Silence of a neighbour after which a relay probes it, ms; 0 selects the firmware's default.
+    /// Silence of a neighbour after which a relay requests heartbeats, ms; 0 for the firmware's default.
     probe_after_ms: u32,
 }
 
@@ -292,7 +292,7 @@ impl<'a> Asked<'a> {
 
     /// Simulates the flight over terrain and no-fly areas.
     ///
-    /// `None` without terrain, or if the positions are not known.
+    /// `None` if the scenario has no terrain, or if the positions are not known.
     ///
     /// # Errors
     /// A hop is blocked, a relay is too low or too high, or the elevation files cannot be used.
@@ -340,8 +340,8 @@ impl<'a> Asked<'a> {
 
     /// Returns the lowest and the highest ground around the flight, m above the sea.
     ///
-    /// It is the ground from Tx to Rx, and beside this line as far as drones take off. The highest ground is raised by
-    /// the least height above the ground. `None` without terrain.
+    /// It is the ground from Tx to Rx, up to the lateral distance at which drones take off. The least permitted height
+    /// above the ground is added to the highest ground. `None` if the scenario has no terrain.
     fn ground_m(&self) -> Result<Option<[f64; 2]>, String> {
         let scenario = &self.scenario;
         let why = |line: String| {
@@ -366,7 +366,7 @@ impl<'a> Asked<'a> {
         error_m.map_or(POSITION_ERROR_M, f64::from)
     }
 
-    /// Prints why terrain and no-fly areas of the scenario are not checked.
+    /// Prints the reason `why` terrain and no-fly areas of the scenario are not checked.
     fn unchecked(&self, why: &str) -> Option<Simulated> {
         let has_terrain = self.scenario.terrain.is_some();
         for (what, is_there) in [
@@ -380,7 +380,7 @@ impl<'a> Asked<'a> {
         None
     }
 
-    /// Returns true with the option `--all` or `--bundle`.
+    /// Returns true if the option `--all` or `--bundle` is given.
     const fn is_whole(&self) -> bool {
         self.options.folder.all || self.options.folder.bundle.is_some()
     }
@@ -553,9 +553,9 @@ fn new_key() -> Result<[u8; 32], String> {
     Ok(key)
 }
 
-/// Checks that the radio channel is fast enough for `uavs` relays; wires always are.
+/// Checks that the radio channel is fast enough for `uavs` relays. Wires are always fast enough.
 ///
-/// `probe_after` is the silence of a neighbour after which a relay probes it.
+/// `probe_after` is the silence of a neighbour after which a relay requests heartbeats.
 fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
     if options.wires {
         return Ok(());
@@ -747,7 +747,8 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
 /// Returns the method to provision: `method`, else the method of the section `network`, else `align`.
 ///
 /// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is from the section. If
-/// the two differ, a planned method is an error; a method of the command line is used, with a message.
+/// the two differ, there is an error if `method` is from the plan. A method from the command line is used, and a
+/// message is printed.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,

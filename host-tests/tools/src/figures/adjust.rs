@@ -36,7 +36,7 @@ struct ShapeRow {
     altitude_m: f32,
 }
 
-/// Table row: SIR of the chain after one round of Algorithm 2, with each of two searches.
+/// Table row: SIR of the chain after one round of Algorithm 2, with each of two search methods.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct RoundRow {
     /// Round number of Algorithm 2; 0 stands for the chain before the first round.
@@ -49,7 +49,7 @@ struct RoundRow {
 
 /// Simulates at most `rounds` rounds of Algorithm 2, for `relays` relays that start at `altitude_m`.
 ///
-/// `local` is the search for a relay's best position. The interferer is at (500, 150) m.
+/// `local` is the search method for a relay's best position. The interferer is at (500, 150) m.
 pub fn adjusted(
     relays: u16,
     altitude_m: f64,

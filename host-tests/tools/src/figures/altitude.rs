@@ -27,7 +27,7 @@ struct Row {
     sir_linear: f64,
     /// SIR of the worst hop with the paper's step, linear; `None` far from the paper's best altitude.
     ///
-    /// With this step the target SIR falls by 0.1 for each series of messages along the chain.
+    /// With this step the target SIR falls by 0.1 from one pass of messages along the chain to the next.
     sir_by_step_linear: Option<f64>,
 }
 
@@ -41,7 +41,8 @@ fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
 
 /// Returns the points of the figure: pairs of an interferer's offset and a common altitude, m.
 ///
-/// Altitudes are 5 m apart. For the offset of the paper's best altitude, they are 0.5 m apart near that altitude.
+/// Altitudes are in steps of 5 m. For the interferer's offset [`PAPERS_OFFSET_M`], they are in steps of 0.5 m near the
+/// paper's best altitude.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {
@@ -80,8 +81,8 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 
 /// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// The interferer is at (500, `y_m`) m. The search tries altitudes 5 m apart, and then refines the best of them to 0.1
-/// m. The refined altitude must have a higher SIR by more than twice the tolerance of a chain's SIR.
+/// The interferer is at (500, `y_m`) m. The search tries altitudes in steps of 5 m, and then refines the best of them
+/// to 0.1 m. The refined altitude is used only if its SIR is higher by more than twice the tolerance of a chain's SIR.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;

@@ -50,11 +50,11 @@ struct Row {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
-    /// Best SIR of a relay on the line Tx-Rx at the lowest altitude, linear.
+    /// Best SIR of a relay with y = 0 at the lowest altitude, linear.
     line_sir_linear: f32,
-    /// Best SIR of a relay on the line Tx-Rx at any permitted altitude, linear.
+    /// Best SIR of a relay with y = 0 at any permitted altitude, linear.
     altitude_sir_linear: f32,
-    /// Best SIR of a relay beside the line Tx-Rx at the lowest altitude, linear.
+    /// Best SIR of a relay with any permitted y at the lowest altitude, linear.
     side_sir_linear: f32,
     both_sir_linear: f32,
     both_altitude_m: f32,
@@ -80,7 +80,7 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
 
 /// Returns the relay's best positions at the lowest altitude.
 ///
-/// There is one for each interferer's offset and each limit of the relay's |y|. The limits are `step_m` apart.
+/// There is one for each interferer's offset and each limit of the relay's |y|. The limits are in steps of `step_m`.
 fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
@@ -100,7 +100,7 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the relay's best SIRs for interferers at several y, which are `step_m` apart.
+/// Returns the relay's best SIRs for interferers at several y, in steps of `step_m`.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()

@@ -20,7 +20,7 @@ struct Row {
     beta: f64,
     /// Product of Upsilon = E[1/I] and the largest interference power `I_max`.
     ///
-    /// Relays use 1 / Upsilon as the interference power.
+    /// Relays use 1 / Upsilon as the interference power I.
     upsilon_times_i_max: f64,
     /// Interference power I as a fraction of its maximum `I_max`, 0 to 1.
     interference_over_i_max: f64,

@@ -16,7 +16,7 @@ pub struct Chart {
 /// Panel of a chart: a pair of axes and the curves drawn in it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Panel {
-    /// Heading that distinguishes the panel from the others; empty for a single panel.
+    /// Heading that distinguishes the panels of a chart; empty for a single panel.
     pub heading: String,
     /// Horizontal axis of the panel.
     pub x: Axis,
@@ -53,7 +53,7 @@ pub struct Line {
 /// Style of a curve: colour, stroke and markers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
-    /// Number of the colour, 0 to 6. It also selects the shape of the markers.
+    /// Number of the colour, 0 to 6. The number also selects the shape of the markers.
     pub hue: usize,
     /// Stroke between the curve's points: full, dashed or dotted.
     pub stroke: Stroke,
@@ -68,7 +68,7 @@ pub enum Signs {
     None,
     /// Marker at every point.
     All,
-    /// Markers at points that are well apart in the picture, and at the last point.
+    /// Markers at points that are not too close to each other in the picture, and at the last point.
     Spaced,
 }
 
@@ -138,7 +138,7 @@ impl Look {
         }
     }
 
-    /// Returns the style with markers that are well apart in the picture.
+    /// Returns the style with markers at only some of the points ([`Signs::Spaced`]).
     pub const fn spaced(self) -> Self {
         Self {
             signs: Signs::Spaced,
@@ -198,7 +198,7 @@ impl Chart {
 
 const STEPS: f64 = 6.0;
 
-/// Largest number of decades on a logarithmic axis with tick labels at 1, 2 and 5 times a power of ten.
+/// Largest number of decades of an axis that has tick labels at 1, 2 and 5 times a power of ten.
 ///
 /// A longer axis has labels at powers of ten only.
 const FEW_DECADES: f64 = 2.4;
@@ -231,7 +231,7 @@ impl Scale {
         Self { kind, from, to }
     }
 
-    /// Creates an axis for data from `least` to `most`. Its ends are the next round numbers outside.
+    /// Creates an axis for data from `least` to `most`. Its ends are the next round numbers outside of this range.
     pub fn around(kind: Kind, least: f64, most: f64) -> Self {
         match kind {
             Kind::Linear => {

@@ -50,7 +50,7 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects the passes of messages that the figure draws; the last ones are closer together.
+/// Selects the passes of messages that the figure draws: more of the last passes than of the first.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()

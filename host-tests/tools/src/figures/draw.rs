@@ -29,7 +29,7 @@ const PEN: u32 = 4;
 const APART: f64 = 105.0;
 /// Shift of a curve's markers along the curve for each colour number, in picture units.
 ///
-/// The markers of coinciding curves are then side by side.
+/// So the markers of curves that coincide are next to each other.
 const APART_BY_HUE: u8 = 25;
 
 /// Error: the chart cannot be drawn, for this reason.
@@ -249,7 +249,7 @@ fn with_title(svg: &str, title: &str) -> String {
     }
 }
 
-/// Colours of the curves: the palette of Okabe and Ito, black first, without its faint yellow.
+/// Colours of the curves: the palette of Okabe and Ito, beginning with black, without its yellow.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),

@@ -10,7 +10,7 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
-/// Largest target SIR of the figure, linear. Every whole number from 1 to it is computed.
+/// Largest target SIR of the figure, linear. The targets are all whole numbers from 1 up to this one.
 pub const MOST_TARGET: u16 = 40;
 
 /// Positions (X, Y) of the interferer, m, one for each curve of the figure.

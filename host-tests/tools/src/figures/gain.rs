@@ -9,7 +9,7 @@ use super::{paper, walk};
 use crate::baseline::{DRAWS, blind_places, equal_places, mean};
 use uav_relay_scenario::scene::Scene;
 
-/// Largest number of relays in the figure; every number from 1 to it is drawn.
+/// Largest number of relays in the figure, which has all numbers from 1 up to this one.
 pub const MOST_RELAYS: u16 = 100;
 
 /// Seed of the random chains. A chain of N relays uses this seed plus N.

@@ -26,11 +26,11 @@ struct Row {
     common_altitude_m: f64,
     /// SIR of Algorithm 1 at the best common altitude, linear.
     common_sir_linear: f64,
-    /// SIR of Algorithm 2 from the best common altitude on, linear.
+    /// SIR of Algorithm 2, which starts with all relays at the best common altitude, linear.
     adjust_sir_linear: f64,
     /// Number of messages of Algorithm 1 and then Algorithm 2.
     adjust_messages: u64,
-    /// SIR of the joint method, linear. It chooses positions and altitudes together.
+    /// SIR of the joint method, linear. This method chooses positions and altitudes together.
     joint_sir_linear: f64,
     joint_passes: u32,
     joint_messages: u64,

@@ -13,20 +13,20 @@ use crate::plan::carried::Carried;
 use crate::plan::rate::Rate;
 use crate::plan::{Number, Plan, PlanRequest, plan};
 
-/// Largest number of relays in the figure; every number from 1 to it is drawn.
+/// Largest number of relays in the figure, which has all numbers from 1 up to this one.
 pub const MOST_RELAYS: u16 = 24;
 
 /// Table row: SIRs and data rates of one number of relays, in one direction and in both.
 ///
-/// For both directions, the same SIR or rate is required in each.
+/// For data in both directions, the same SIR or rate is required toward Rx and toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
-    /// SIR of the worst hop to Rx, linear, at the best positions for data to Rx.
+    /// SIR of the worst hop toward Rx, linear, at the best positions for data to Rx only.
     one_way_sir_linear: f64,
-    /// SIR of the worst hop of both directions, linear, at the best positions for both.
+    /// SIR of the worst hop toward Rx or Tx, linear, at the best positions for data in both directions.
     both_ways_sir_linear: f64,
-    /// SIR of the worst hop of both directions, linear, at the best positions for data to Rx.
+    /// SIR of the worst hop toward Rx or Tx, linear, at the best positions for data to Rx only.
     judged_sir_linear: f64,
     /// Data rate to Rx in equal time slots, at the positions with the largest rate.
     one_way_slots_bit_per_s_hz: f64,

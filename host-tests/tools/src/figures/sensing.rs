@@ -25,7 +25,7 @@ pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 struct AgreementShare {
     scene: &'static str,
     relays: u16,
-    /// Number of agreements on positions that used measurements of the interference.
+    /// Number of agreements on positions so far that used measurements of the interference.
     agreements: usize,
     /// Median of the chain's SIR divided by the best possible SIR, over all arrangements of interferers.
     median_linear: f64,
@@ -38,9 +38,9 @@ struct AgreementShare {
 struct Tracked {
     relays: u16,
     speed_mps: f64,
-    /// Mean of SIR / best possible SIR at each moment, if the chain follows the interferer.
+    /// Mean over time of SIR / best possible SIR, if the chain follows the interferer.
     followed_linear: f64,
-    /// Mean of SIR / best possible SIR at each moment, if the chain does not move.
+    /// Mean over time of SIR / best possible SIR, if the chain does not move.
     ///
     /// It keeps the positions that were best after the first minute.
     stayed_linear: f64,

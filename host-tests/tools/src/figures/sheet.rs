@@ -21,7 +21,7 @@ pub struct Sheet {
     pub title: &'static str,
     /// Paragraphs of the figure's caption.
     pub says: Vec<String>,
-    /// Notes below the figure: parameters of the computation, among them those that the paper omits.
+    /// Notes below the figure: all parameters of the computation, also those that the paper omits.
     pub taken: Vec<String>,
     /// Chart of the figure, written as an SVG file.
     pub chart: Chart,

@@ -39,7 +39,8 @@ struct Row {
     random_sir_db: f64,
     /// Mean over random positions of log2(1 + SIR) of the worse hop, bit/s/Hz.
     random_rate_bit_per_s_hz: f64,
-    /// SIR of the worse hop with the relay where the weaker received signal is strongest, linear.
+    /// SIR of the worse hop, linear, with the relay at the blind position. There the weaker received signal is
+    /// strongest.
     ///
     /// This position does not depend on the interference.
     blind_sir_linear: f64,
@@ -120,14 +121,14 @@ pub const RELAY_W: [f64; 17] = [
     0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0,
 ];
 
-/// Average gains in the paper, percent: over random positions, and over the blind method.
+/// Average gains stated in the paper, percent: over random positions, and over the blind method.
 ///
 /// The blind method ignores the interference.
 pub const PRINTED_PERCENT: (f64, f64) = (30.14, 25.73);
 
 const PRINTED_LARGEST_PERCENT: f64 = 65.0;
 
-/// Largest difference between equal gains, computed and printed, percentage points.
+/// Largest difference at which a computed and a printed gain count as equal, percentage points.
 const NEAR: f64 = 0.5;
 
 /// Reading of the paper's "average gain": the quantity that is averaged over the altitudes.
@@ -136,7 +137,7 @@ pub enum Reading {
     /// Mean over the altitudes of the gain in linear SIR.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Gain of the mean linear SIR over the altitudes.
+    /// Gain in the linear SIR that is averaged over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
     /// Gain of the mean SIR, where the SIRs are averaged in dB over the altitudes.
@@ -212,9 +213,9 @@ fn gains(
         .collect())
 }
 
-/// Returns the mean that `reading` needs, for four positions of the relay at one altitude.
+/// Returns the quantity that `reading` averages, for four positions of the relay at one altitude.
 ///
-/// The positions are the best one, a random one, the best one without interference, and the middle.
+/// The positions are the best one, a random one, the one that ignores the interference, and the middle.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
     let linear = [
         f64::from(row.sir_linear),
@@ -238,7 +239,7 @@ fn four(row: &Row, reading: Reading) -> [f64; 4] {
 
 /// Averages the gains in `rows`, the altitudes of one pair of powers, as `reading` states.
 ///
-/// `None` without rows.
+/// `None` if there are no rows.
 fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     let first = rows.first()?;
     let percent = |best: f64, under: f64| 100.0 * (best / under - 1.0);
@@ -277,8 +278,8 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
 
 /// Returns the larger difference between a row's two average gains and the printed gains.
 ///
-/// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, otherwise over
-/// the blind method.
+/// The difference is in percentage points. If `middle` is true, the second average is the gain over a relay in the
+/// middle, otherwise over the blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent
@@ -291,7 +292,7 @@ fn off(row: &GainRow, middle: bool) -> f64 {
     from(row.over_random_percent, PRINTED_PERCENT.0).max(from(other, PRINTED_PERCENT.1))
 }
 
-/// Returns two paragraphs that say how many computed averages agree with the paper's averages.
+/// Returns two paragraphs that state how many computed averages agree with the paper's averages.
 fn findings(gains: &[GainRow]) -> Vec<String> {
     let least = |reading: Reading| {
         let of = gains.iter().filter(|row| row.reading == reading);

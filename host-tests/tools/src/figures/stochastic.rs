@@ -20,7 +20,7 @@ const SPACING_M: u32 = 20;
 
 const ALPHA: f64 = 3.0;
 
-/// Largest interference power, as a multiple of the power received from 1 W right below the relay.
+/// Largest interference power, as a multiple of the power received from a 1 W sender below the relay.
 const MOST: f64 = 2.0;
 
 /// Kind of interference: varying along the line Tx-Rx, or the same everywhere.
@@ -29,11 +29,11 @@ const MOST: f64 = 2.0;
 pub enum Kind {
     /// Interference that varies along the line Tx-Rx: E[1 / I] is between 0.6 / P and 1 / P.
     ///
-    /// I is the interference power. P is the power that a relay receives from 1 W right below it.
+    /// I is the interference power. P is the power that a relay receives from a 1 W sender vertically below the relay.
     Uneven,
     /// Interference that is the same everywhere: E[1 / I] is 0.8 / P.
     ///
-    /// I is the interference power. P is the power that a relay receives from 1 W right below it.
+    /// I is the interference power. P is the power that a relay receives from a 1 W sender vertically below the relay.
     Even,
 }
 
@@ -61,7 +61,7 @@ struct PointRow {
     i_max_w: f64,
 }
 
-/// Returns the power, W, that a relay receives from a sender of 1 W right below it.
+/// Returns the power, W, that a relay receives from a 1 W sender vertically below the relay.
 fn lambda_w(mission: &Mission) -> f64 {
     let height = f64::from(mission.config().common.altitude_m);
     1.0 / (mission.config().channel.eta() * height * height)

@@ -21,7 +21,7 @@ pub struct Chain {
     pub sir: f64,
 }
 
-/// Places each relay as far toward Rx as the target SIR `target` (linear, > 0) allows.
+/// Returns a chain with each relay as far toward Rx as the SIR `target` (linear, > 0) allows.
 ///
 /// `None` if a hop cannot meet the target. If the target is too high, the last relay is too far from Rx, and the last
 /// hop has a lower SIR. The cost is one search for a farthest position for each relay.
@@ -71,7 +71,7 @@ pub struct Sweep {
     pub number: u32,
     /// Target SIR of every hop in this pass of messages, linear.
     pub target: f32,
-    /// Chain with each relay as far from Tx as the target allows; `None` if a hop cannot meet it.
+    /// Chain with each relay as far from Tx as the target allows; `None` if a hop cannot meet the target.
     pub chain: Option<Chain>,
 }
 

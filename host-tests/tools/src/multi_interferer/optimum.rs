@@ -25,7 +25,7 @@ pub struct Chain {
     pub sir: f64,
     /// SIR of the best chain without a minimum separation, linear.
     ///
-    /// It equals `sir` if the separation does not restrict the chain.
+    /// This SIR equals `sir` if the separation does not restrict the chain.
     pub free_sir: f64,
 }
 
@@ -38,11 +38,11 @@ impl Chain {
 
 /// Returns the best chain of relays at one common altitude; exact except for rounding.
 ///
-/// The powers of the relays may differ. If the minimum separation binds, it is the best of the chains that keep it.
-/// Without a minimum separation, relays may share a position if another hop is the worst.
+/// The powers of the relays may differ. If the minimum separation restricts the chain, the result is the best of the
+/// chains that keep it. Without a minimum separation, two relays may have the same position.
 ///
-/// `None` without relays or interferers, if altitudes differ, if the relays do not fit between Tx and Rx, and if no
-/// chain has an SIR above zero (an interferer at Rx).
+/// `None` if there are no relays or no interferers, if altitudes differ, if the relays do not fit between Tx and Rx,
+/// and if no chain has an SIR above zero (an interferer at Rx).
 ///
 /// Tested to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
 /// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in
@@ -79,8 +79,8 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
 
 /// Returns the SIR of the best chain at `altitude_m` that keeps the minimum separation, linear.
 ///
-/// `tolerance` is relative. `None` without relays or interferers, if the relays do not fit between Tx and Rx, and if no
-/// chain has an SIR above 0.
+/// `tolerance` is relative. `None` if there are no relays or no interferers, if the relays do not fit between Tx and
+/// Rx, and if no chain has an SIR above 0.
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)
@@ -120,7 +120,8 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
 
 /// Number of intervals of altitude in the first scan.
 ///
-/// The range of altitudes is divided twice: into intervals of equal length, and into intervals of equal ratio.
+/// The range of altitudes is divided twice: into intervals of equal length, and into intervals with an equal ratio of
+/// their limits.
 const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;
@@ -233,7 +234,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// x of the receiver, m, that meets the target with the sender at the smallest x of `from`.
+    /// x of the receiver, m, at which it meets the target if the sender is at the smallest x of `from`.
     farthest: f64,
 }
 
@@ -242,7 +243,7 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Intervals of x of each relay from which all later hops can meet one target SIR.
+/// Intervals of x of each relay, from which all hops from this relay to Rx can meet one target SIR.
 ///
 /// They are computed from Rx to Tx. The hop from Tx to the first relay is not checked.
 pub(super) struct Stages<'a> {
@@ -251,7 +252,7 @@ pub(super) struct Stages<'a> {
     target: f64,
     /// Feasible hops that relays N - 1, N - 2, ..., 1 send, in this order.
     before: Vec<Stage>,
-    /// Positions of relay 1 from which all later hops can meet the target SIR.
+    /// Positions of relay 1 from which all hops to Rx can meet the target SIR.
     first: Vec<Span>,
 }
 
@@ -265,8 +266,8 @@ struct Reach {
 impl<'a> Stages<'a> {
     /// Computes the feasible positions of each relay for the SIR `target` (linear, > 0).
     ///
-    /// Relays are at least `apart` metres apart. `None` if a relay has no feasible position. The cost is a scan of the
-    /// sampled positions for each change of power along the chain, and a few intervals for each relay.
+    /// The distance of two relays is at least `apart` metres. `None` if a relay has no feasible position. The cost is a
+    /// scan of the sampled positions for each change of power along the chain, and a few intervals for each relay.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
         let (last, others) = line.scene.relays.split_last()?;
         let mut spans = vec![Span {
@@ -309,8 +310,8 @@ impl<'a> Stages<'a> {
 
     /// Returns the x of each relay, m, in a chain that meets the target SIR. [`Stages::is_met`] must be true.
     ///
-    /// The x rise from Tx to Rx. The hops are as equal as the target allows. `None` if the feasible positions are not
-    /// connected.
+    /// The x rise from Tx to Rx. The lengths of the hops differ as little as the target allows. `None` if the feasible
+    /// positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;
@@ -371,7 +372,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns the last point from `sure` toward `wish` up to which `holds` returns true.
+/// Returns the last point on the way from `sure` to `wish` up to which `holds` returns true.
 ///
 /// `holds` must be true at `sure`.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
@@ -394,7 +395,7 @@ pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Longest hop to each sampled position, apart from a factor: (I + N)^(-1/2), in W^(-1/2).
+    /// Longest hop to each sampled position, divided by a factor: (I + N)^(-1/2), in W^(-1/2).
     ///
     /// I and N are the powers of interference and noise at the receiver, W. The factor is a [`Stride`].
     quiet: Vec<f64>,
@@ -467,7 +468,7 @@ impl<'a> Line<'a> {
         (quiet, -0.5 * quiet * change / power)
     }
 
-    /// Returns half of the derivative of ln(SIR) along x, 1/m, for the hop from Tx to a relay at `x`.
+    /// Returns half of the derivative of ln(SIR) by x, 1/m, for the hop from Tx to a relay at `x`.
     fn first_rise(&self, x: f64) -> f64 {
         let (quiet, slope) = self.quiet_and_slope(x);
         slope / quiet - x / (x * x + self.altitude_m * self.altitude_m)
@@ -492,12 +493,12 @@ impl<'a> Line<'a> {
 
     /// Returns the smallest x of a sender, m, from which a receiver at `x` has the target SIR.
     ///
-    /// `stride` is the factor for the target SIR and the sender's power. The result may be behind Tx (below 0).
+    /// `stride` is the factor for the target SIR and the sender's power. The result may be below 0, the x of Tx.
     pub(super) fn heard_from(&self, stride: Stride, x: f64) -> f64 {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// Returns the x of the receivers whose sender can be closest to Tx, as minima.
+    /// Returns the x of the receivers whose senders can be closest to Tx.
     ///
     /// They are the minima of [`Line::heard_from`] over the receiver's x.
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
@@ -508,7 +509,7 @@ impl<'a> Line<'a> {
         }))
     }
 
-    /// Returns the intervals of x in which a receiver meets the target `apart` metres from its sender.
+    /// Returns the intervals of x in which a receiver meets the target. Its sender is `apart` metres nearer to Tx.
     pub(super) fn hearing(&self, stride: Stride, apart: f64) -> Vec<Span> {
         let level = apart / stride.0;
         let turns = crossings(&self.nodes, &self.quiet, level, |x| {
@@ -531,7 +532,8 @@ impl<'a> Line<'a> {
 
     /// Returns the smallest x, m, from which the last relay meets the SIR `target` at Rx; at least 0.
     ///
-    /// The relay has `power_w` watts; `target` is linear and above 0. `None` if the target is missed even above Rx.
+    /// The relay has `power_w` watts; `target` is linear and above 0. `None` if a relay vertically above Rx misses the
+    /// target, too.
     pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
         let scene = self.scene;
         let squared = power_w / (scene.eta * target * (scene.interference_rx_w() + scene.noise_w));
@@ -540,13 +542,13 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns those positions of `turns` at which the function falls through its level.
+/// Returns the positions of those crossings in `turns` at which the function falls.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()
 }
 
-/// Closed interval [low, high] of x, m; a single point if both are equal.
+/// Closed interval [low, high] of x, m; a single point if the two limits are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     pub(super) low: f64,
@@ -609,13 +611,13 @@ mod tests {
     }
 }
 
-/// Largest number of bisection steps. Any f64 interval in metres shrinks to two adjacent numbers before.
+/// Largest number of bisection steps. Any f64 interval in metres shrinks to two adjacent numbers in fewer steps.
 const HALVINGS: u32 = 200;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     pub(super) at: f64,
-    /// True if the function rises through its level here; false if it falls.
+    /// True if the function rises at this crossing of the level; false if it falls.
     pub(super) rising: bool,
 }
 
@@ -645,8 +647,8 @@ pub(super) fn crossings(
 
 /// Returns the last point from `inside` towards `outside` at which `holds` is still true.
 ///
-/// `outside` may be lower or higher than `inside`. `holds` must be true at `inside` and false at `outside`; if it
-/// changes more than once, one of the changes is found.
+/// `outside` may be lower or higher than `inside`. `holds` must be true at `inside` and false at `outside`; if its
+/// value changes more than once in between, one of the changes is found.
 pub(super) fn boundary(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = inside.midpoint(outside);

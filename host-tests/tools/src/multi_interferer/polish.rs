@@ -14,7 +14,7 @@ const GAIN: f64 = 1e-6;
 
 /// Number of consecutive rounds without progress after which the search ends.
 ///
-/// It is above 1, because a round without progress may prepare the gain of the next.
+/// It is above 1, because a round without progress may make progress possible in the next round.
 const PATIENCE: u32 = 3;
 
 /// Number of equal steps along x in the first scan for a relay's best position.
@@ -22,7 +22,7 @@ const PLACES: u32 = 16;
 
 /// Number of equal steps in the first round's scan of altitudes, and of lateral positions.
 ///
-/// Later rounds search only one such step on either side of the present value.
+/// Later rounds search only from one such step below to one such step above the present value.
 const LEVELS: u32 = 8;
 
 /// Number of golden-section steps that refine a maximum. They reduce the interval to 1e-7 of its length.
@@ -39,7 +39,7 @@ pub struct Polished {
     pub rounds: u32,
 }
 
-/// Search for the best position of one relay while its two neighbours stay where they are.
+/// Search for the best position of one relay, while its two neighbours keep their positions.
 struct Turn<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
@@ -51,12 +51,12 @@ struct Turn<'a> {
 
 /// Improves the chain `start` by moving one relay at a time within the limits `room`.
 ///
-/// The result is never worse than `start`. It keeps order and minimum separation if `start` does. A relay with a fixed
-/// altitude moves along x and sideways only. `None` unless `start` has one position per relay and at least one relay.
+/// The result is never worse than `start`. The result keeps order and minimum separation if `start` does. A relay with
+/// a fixed altitude moves only along x and y. `None` unless `start` has one position per relay and at least one relay.
 ///
 /// The search ends after 200 rounds, or after three rounds in a row that each gain less than a millionth. A round is 2
 /// N moves. A move computes about 50 SIRs at one altitude, and 2 400 in a range of altitudes. Free lateral positions
-/// take another 2 400.
+/// take 2 400 more.
 pub fn polish(
     scene: &Scene,
     start: &[impl Copy + Into<Place>],
@@ -91,8 +91,8 @@ pub fn polish(
 
 /// Moves relay `at` (from 0) if that raises the SIR of the worse of its two hops.
 ///
-/// Altitude and lateral position are searched on both sides of the present values, up to the fraction `window` of the
-/// permitted ranges `room`.
+/// Altitude and lateral position are searched above and below the present values. Both change by at most the fraction
+/// `window` of the permitted ranges `room`.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
     let relays = &scene.relays;
     let (Some(&own), Some(relay)) = (places.get(at), relays.get(at)) else {
@@ -130,8 +130,8 @@ impl Turn<'_> {
 
     /// Returns the best position found for the relay, and the SIR of its worse hop.
     ///
-    /// From the position `own`, the search first changes the altitude, and then the lateral position. The SIR is 0 if
-    /// no position is allowed.
+    /// The search starts from the position `own`. It first changes the altitude, and then the lateral position. The SIR
+    /// is 0 if no position is allowed.
     fn best(&self, own: Place, room: Corridor, window: f64) -> (Place, f64) {
         let start = if self.relay.holds {
             own.h
@@ -202,8 +202,8 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
 
 /// Searches the altitude or lateral position near `own` at which a relay has the best SIR.
 ///
-/// `at` returns the relay's best position and its SIR for a given altitude or lateral position. `window` is the
-/// fraction of the range `least` to `most` that is searched on either side.
+/// `at` returns the relay's best position and its SIR for a given altitude or lateral position. The search covers the
+/// fraction `window` of the range `least` to `most` above `own`, and the same below.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

@@ -130,9 +130,9 @@ pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result
 
 /// Returns the plan with the fewest relays that give every hop the SIR `target`, by bisection.
 ///
-/// The upper limit of the search is the fewest relays at one common altitude; `at_level` plans them for one altitude.
-/// `free` plans a given number of relays with free altitudes. The search assumes that more relays never have a lower
-/// SIR.
+/// The upper limit of the search is the fewest relays at one common altitude; `at_level` plans the fewest relays for
+/// one altitude. `free` plans a given number of relays with free altitudes. The search assumes that more relays never
+/// have a lower SIR.
 pub(super) fn fewest_of(
     scenario: &Scenario,
     target: f64,

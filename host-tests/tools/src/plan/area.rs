@@ -38,10 +38,11 @@ const DRAWS: [usize; 2] = [400, 4000];
 /// Seed of the random draws. It is fixed, so that equal scenarios have equal plans.
 const SEED: u64 = 36;
 
-/// Largest number of rounds of the search for a quantile. Each leaves out the draws with the lowest SIRs.
+/// Largest number of rounds of the search for a quantile. Each round leaves out the draws with the lowest SIRs.
 const ROUNDS: u32 = 8;
 
-/// Factor for the SIR of a hop whose path crosses a no-fly area. Such chains rank behind all others.
+/// Factor on the SIR of a hop if the straight path between its two relays crosses a no-fly area. Such chains rank
+/// behind all others.
 const CROSSING: f64 = 1e-30;
 
 /// Length that counts as 0 because of rounding, m: depth in a no-fly area, or length of a path in it.
@@ -52,10 +53,10 @@ const GRID: [u32; 3] = [40, 7, 5];
 
 /// Largest number of searches in windows around the relays, and factor on the width of a window.
 ///
-/// The factor applies after a search that gains little.
+/// The factor applies after a search that raises the SIR only a little.
 const WINDOWS: (u32, f64) = (120, 0.6);
 
-/// Largest number of times that the windows start again with their full width.
+/// Largest number of times that the windows around the relays are reset to their full width.
 const RESTARTS: u32 = 5;
 
 /// Width of the narrowest window along x, as a fraction of the distance Tx-Rx.
@@ -75,8 +76,8 @@ pub struct Criterion {
 
 /// Plans the positions that `ask` requests, for interferers in areas and with no-fly areas.
 ///
-/// With a quantile, the positions maximise this quantile of the SIR, otherwise the SIR of the worst case. The SIRs in
-/// the plan are always for the worst case.
+/// If `criterion` has a quantile, the positions maximise this quantile of the SIR, otherwise the SIR of the worst case.
+/// The SIRs in the plan are always for the worst case.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest, criterion: Criterion) -> Result<Plan, NoPlan> {
     let wrong = |line: &str| Err(NoPlan::Wrong(line.to_owned()));
     if scenario.areas.is_empty() {
@@ -132,7 +133,8 @@ pub fn at_centre(scenario: &Scenario) -> Scenario {
     }
 }
 
-/// Returns a mission for the profiles of the relays. It has only one of the interferers, which is not used.
+/// Returns a mission for the profiles of the relays. The mission has only one of the interferers, and this one is not
+/// used.
 pub(super) fn profiles(
     scenario: &Scenario,
     relays: u16,
@@ -240,7 +242,7 @@ fn places_of(plan: &Plan) -> Vec<Place> {
 /// Position x, y and altitude, m.
 type Point = [f64; 3];
 
-/// Returns the paths of two neighbours that close a gap: each flies to the other's position.
+/// Returns the paths of two neighbours when a gap is closed. Each flies to the position of the other one.
 ///
 /// A relay flies straight to its new position. A relay that `keeps` its altitude, as with Algorithm 1, flies level.
 pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {
@@ -265,8 +267,8 @@ pub(super) fn range(area: &NoFly) -> String {
 
 /// Returns the reason why relays cannot be at the positions `chain`; `None` if they can.
 ///
-/// If `is_free`, relays choose their altitudes in flight, except relays with an altitude in the scenario. With
-/// `allow_crossing`, a path between neighbours through a no-fly area is no reason.
+/// If `is_free` is true, relays choose their altitudes in flight, except relays with an altitude in the scenario. If
+/// `allow_crossing` is true, a path between neighbours through a no-fly area is not a reason.
 pub fn problem(
     scenario: &Scenario,
     chain: &[Placement],
@@ -320,7 +322,7 @@ fn inside(area: &NoFly, index: u16, [x, y, h]: Point) -> Option<String> {
     ))
 }
 
-/// Returns a text for each relay that flies through a no-fly area, or into it.
+/// Returns a text for each relay that flies through a no-fly area or ends in one.
 ///
 /// The relays `indices` fly from their positions `from` to those in `to`.
 pub(super) fn entered(
@@ -470,7 +472,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns the chain with the best worst hop, and the SIR of this hop.
+    /// Returns the chain whose worst hop has the largest SIR, and this SIR.
     ///
     /// Relay k is at a spot of `grids[k - 1]`.
     fn best_on(&self, grids: &[Vec<Spot>]) -> Option<(Vec<Spot>, f64)> {
@@ -578,7 +580,7 @@ impl<'a> Search<'a> {
 
     /// Returns the chain after moves within windows around all relays, and its SIR.
     ///
-    /// `None` if no allowed position is near.
+    /// `None` if no allowed position is within the windows.
     fn refined(&self, start: &[Spot]) -> Option<(f64, Vec<Place>)> {
         let room = self.room();
         let mut width = room.map(|[low, high]| high - low);
@@ -731,7 +733,7 @@ impl Draws {
         count.clamp(1, self.draws.len())
     }
 
-    /// Returns the SIR that the chain's worst hop reaches in the fraction `quantile` of the draws, linear.
+    /// Returns the SIR, linear, that the chain has at least in the fraction `quantile` of the draws.
     pub fn quantile(&self, chain: &[impl Copy + Into<Place>], quantile: f64) -> f64 {
         let chain: Vec<Place> = chain.iter().map(|at| (*at).into()).collect();
         let sirs = self.sirs(&chain);
@@ -739,7 +741,7 @@ impl Draws {
             .map_or(0.0, |(sir, _)| *sir)
     }
 
-    /// Returns the draws with the largest SIRs of the chain: the fraction `quantile` of all draws.
+    /// Returns the fraction `quantile` of all draws: those in which the chain has the largest SIRs.
     fn most_harmless(&self, chain: &[Place], quantile: f64) -> Vec<Vec<Source>> {
         let sirs = self.sirs(chain).into_iter().take(self.counted(quantile));
         sirs.filter_map(|(_, at)| self.draws.get(at).cloned())
@@ -747,7 +749,7 @@ impl Draws {
     }
 }
 
-/// Largest number of random points until one is inside the area.
+/// Largest number of random points that are drawn until one is inside the area.
 const TRIES: u32 = 100_000;
 
 fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
@@ -770,13 +772,13 @@ fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
 pub struct OverArea {
     /// SIR of the worst hop with the interferers at their worst positions and greatest powers, dB.
     pub worst_sir_db: f64,
-    /// SIR that the worst hop reaches in the fraction `quantile` of all positions and powers, dB.
+    /// SIR that the worst hop has at least in the fraction `quantile` of all positions and powers, dB.
     pub quantile_sir_db: f64,
 }
 
 /// Report of a plan over the areas of the interferers.
 ///
-/// It compares the plan with the plan for interferers in the middle of their areas.
+/// It compares this plan with a plan for interferers in the middle of their areas.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AreaReport {
     /// Criterion of the plan: `worst` or `quantile`.
@@ -867,7 +869,7 @@ fn receiver(scene: &Scene, chain: &[Placement]) -> [f64; 2] {
     worst.map_or([0.0; 2], |(_, at)| *at)
 }
 
-/// Cell of the map of SIRs: a square with the interferer inside, and the SIR of the worst hop.
+/// Cell of the map of SIRs: a square, and the SIR of the worst hop if the interferer is in it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cell {
     /// Index of the interferer, from 0.
@@ -880,7 +882,7 @@ pub struct Cell {
     pub sir_db: f64,
     /// Standard deviation, m, of the position that relays with `[listen]` estimate for an interferer here.
     ///
-    /// Infinite if they cannot locate it. `None` if it is not computed.
+    /// Infinite if they cannot locate the interferer. `None` if it is not computed.
     pub error_m: Option<f64>,
 }
 
@@ -889,7 +891,7 @@ const CELLS: f64 = 60.0;
 
 /// Returns the SIR of the worst hop of `plan` for each position of each interferer that has an area.
 ///
-/// Other interferers with an area are at their worst positions.
+/// All remaining interferers with an area are at their worst positions.
 pub fn cells(scenario: &Scenario, plan: &Plan) -> Vec<Cell> {
     let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
     let Some(scene) = Scene::new(scenario, relays) else {

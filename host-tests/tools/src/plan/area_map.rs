@@ -25,7 +25,7 @@ const COLOURS: [[f64; 3]; 5] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// Number of steps in the legend.
+/// Number of steps of the colour scale in the legend.
 const STEPS: u32 = 5;
 
 /// Quantity that a map shows.
@@ -33,7 +33,7 @@ const STEPS: u32 = 5;
 pub enum Shown {
     /// SIR of the worst hop.
     Sir,
-    /// Error of the interferer's position that relays estimate from measurements.
+    /// Error of the interferer's position as relays estimate it from measurements.
     Error,
 }
 
@@ -57,7 +57,7 @@ impl Shown {
 /// Largest error on the colour scale, m. Larger errors have the same colour.
 const MOST_M: f64 = 1e5;
 
-/// Returns the picture of `cells` from above. x points to the right, and y (to the right of x) down.
+/// Returns the picture of `cells` from above. In the picture, x points to the right, and y down.
 pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell], shown: Shown) -> String {
     let numbers = || cells.iter().map(|cell| shown.number(cell));
     let (least, most) = (

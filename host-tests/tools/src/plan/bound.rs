@@ -38,12 +38,12 @@ const MOST_RELAYS: usize = 200;
 /// Allowance for rounding errors, as a fraction of a squared length.
 const ROUNDING: f64 = 1e-9;
 
-/// Target SIRs of every hop, linear: in the direction to Rx, and in the direction to Tx.
+/// Target SIRs of every hop, linear: for data toward Rx, and for data toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Targets {
-    /// Target SIR of each hop in the direction to Rx, linear, above 0.
+    /// Target SIR of each hop for data toward Rx, linear, above 0.
     pub there: f64,
-    /// Target SIR of each hop in the direction to Tx, linear; 0 if the direction to Tx does not count.
+    /// Target SIR of each hop for data toward Tx, linear; 0 if there are no such data.
     pub back: f64,
 }
 
@@ -94,8 +94,8 @@ struct Bound<'a> {
 
 /// Node of the chain with the cells (intervals of x) that it may be in, ascending.
 ///
-/// `hears_squared` belongs to the cells. It is the largest squared length, m^2, of a hop that the node can receive
-/// there at its target SIR.
+/// `hears_squared` belongs to the cells. It is the largest squared length, m^2, of a hop that the node can receive in
+/// the cell at the target SIR.
 struct Node<'a> {
     cells: &'a [Range<f64>],
     hears_squared: Vec<f64>,
@@ -123,7 +123,7 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns, for each cell of one end of `hop`, true if a cell of the other end allows the hop.
+    /// Returns a flag for each cell of one end of `hop`: true if a cell of the opposite end allows the hop.
     ///
     /// The cells are the receiver's if `of_receiver` is true, otherwise the sender's. The sender is the node nearer to
     /// Tx.
@@ -166,7 +166,7 @@ impl Bound<'_> {
 
     /// Returns a lower bound on the interference power that `node` receives in `cell`, W.
     ///
-    /// Each interferer is received at the edge of the cell that is farther from it.
+    /// The node is taken to be at the edge of the cell that is farther from the interferer, for each interferer.
     fn least_w(&self, node: usize, cell: &Range<f64>) -> f64 {
         let altitude_m = self.altitude_m(node);
         let factor = match self.relay(node) {
@@ -205,9 +205,9 @@ fn retain(cells: &mut Vec<Range<f64>>, kept: &[bool]) {
     cells.retain(|_| kept.next() == Some(&true));
 }
 
-/// Returns, for each cell of `here`, true if a hop with a cell of `other` meets the target SIRs.
+/// Returns a flag for each cell of `here`: true if a hop to some cell of `other` meets the target SIRs.
 ///
-/// The hop must be short enough for the receiver at each end.
+/// The hop must be short enough for the receivers at both of its ends.
 fn possible(here: &Node<'_>, other: &Node<'_>) -> Vec<bool> {
     let pairs = here.cells.iter().zip(&here.hears_squared);
     pairs

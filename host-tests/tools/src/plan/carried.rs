@@ -25,7 +25,7 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
-/// Largest relative excess of time per bit; with more, a number of relays gets no precise search.
+/// Largest relative excess of time per bit with which a number of relays gets a precise search.
 ///
 /// The times per bit are those on a coarse grid. The excess is relative to the smallest time of all numbers of relays.
 /// A precise search cannot make up for a larger excess.
@@ -48,9 +48,9 @@ pub struct Carried<'a> {
 impl<'a> Carried<'a> {
     /// Creates the planner for up to `most` relays; `None` if the positions with the best SIR suffice.
     ///
-    /// They suffice if they also maximise the data rate: with equal time slots or a frequency for each hop, for data in
-    /// one direction or at equal rates in both. They also suffice if no better positions are searched: with free
-    /// altitudes, a given x, several interferers, or interference known only along the line Tx-Rx.
+    /// These positions suffice if they also maximise the data rate: with equal time slots or a frequency for each hop,
+    /// for data in one direction or at equal rates in both. They also suffice where this planner cannot search better
+    /// positions: with free altitudes, a given x, several interferers, or interference known only along the line Tx-Rx.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -82,10 +82,10 @@ impl<'a> Carried<'a> {
         table.as_ref()
     }
 
-    /// Returns the largest number of relays that deserves a precise search.
+    /// Returns the largest number of relays for which a precise search is worthwhile.
     ///
     /// With more relays, one bit takes over 5 % more time on the coarse grid than with the best number. A precise
-    /// search cannot make up for this. It is used for fitted time slots (as long as each hop needs).
+    /// search cannot make up for this. The precise search is used for fitted time slots (as long as each hop needs).
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }
@@ -144,7 +144,7 @@ impl<'a> Carried<'a> {
         Ok(Plan { sirs, back, ..plan })
     }
 
-    /// Returns `plan`, marked as proven if it is proven that no positions carry more data.
+    /// Returns `plan`, with `proven` set if it is proven that no positions carry more data.
     ///
     /// There is no proof for fitted time slots (as long as each hop needs).
     #[must_use]

@@ -20,10 +20,10 @@ pub struct Flown {
     pub plan: Plan,
     /// Best SIR of the worst hop, linear, that the planner finds for this number of relays.
     pub best_sir: f64,
-    /// Data rates at the relays' positions and at the best ones found, both per bandwidth, bit/s/Hz.
+    /// Data rates divided by the bandwidth, at the relays' positions and at the best ones found, bit/s/Hz.
     ///
-    /// `None` unless the slots are fitted (as long as each hop needs). With fitted slots these rates decide, not the
-    /// SIRs.
+    /// `None` unless the slots are fitted (as long as each hop needs). If the slots are fitted, the plan is judged by
+    /// these rates, not by the SIRs.
     pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
@@ -75,7 +75,7 @@ impl Flown {
 
 /// Returns the positions that `relays` relays in `scenario` would agree on by `method`.
 ///
-/// The cost is that of two calls of [`super::plan`].
+/// The cost is that of two calls to [`super::plan`].
 pub fn flown(
     scenario: &Scenario,
     relays: u16,
@@ -107,7 +107,7 @@ pub fn flown(
 
 /// Returns the plan with the positions that the relays would find in flight by `method`.
 ///
-/// Relays use one hypothetical interferer in place of several. The SIRs in the plan are against all of them.
+/// Relays use one hypothetical interferer in place of several. The SIRs in the plan are those against all interferers.
 pub(super) fn alone(
     scenario: &Scenario,
     relays: u16,
@@ -133,7 +133,7 @@ pub(super) fn alone(
 
 /// Largest difference of a coordinate between the file's plan and the recomputed plan, m.
 ///
-/// They differ if the file's plan was made on another machine, which rounds differently.
+/// The two differ slightly if the file's plan was made on a machine that rounds differently.
 const SAME_M: f64 = 0.1;
 /// Largest difference of the SIR between the file's plan and the recomputed plan, dB.
 const SAME_DB: f64 = 0.01;
@@ -166,7 +166,7 @@ pub(super) fn shortest(value: f32) -> f64 {
     format!("{value}").parse().unwrap_or_else(|_| value.into())
 }
 
-/// Returns the scenario file `text` with the section `[plan]` at its end; an old section is replaced.
+/// Returns the scenario file `text` with the section `[plan]` at its end, which replaces an old one.
 ///
 /// # Errors
 /// The reason if `text` is not valid TOML.
@@ -288,7 +288,7 @@ const PATHS: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// Returns the scenario file `text`, moved from `folder` to another folder.
+/// Returns the scenario file `text` from `folder` in a form that is valid in any folder.
 ///
 /// Its relative paths become absolute. [`with_files`] does this for elevation files.
 ///

@@ -28,7 +28,7 @@ pub const LOCATED: f64 = 0.1;
 /// Number of positions of the interferer that are simulated.
 const SIMULATED: usize = 5;
 
-/// Fraction of the best SIR that a chain must reach after the location: 1 dB less.
+/// Fraction of the best SIR (-1 dB) that a chain must have once the interferer is located.
 const SHARE: f64 = 0.794;
 
 /// Longest time of a simulated search, s, in addition to a flight from Tx to Rx at 10 m/s.
@@ -47,9 +47,9 @@ pub struct Search {
     /// Absent if the relays do not reach such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placed_s: Option<f64>,
-    /// Distance of the last estimate from the interferer, or from its mirror image at the line Tx-Rx, m.
+    /// Distance of the last estimate from the interferer, or from its mirror image about the line Tx-Rx, m.
     ///
-    /// Absent without an estimate.
+    /// Absent if there is no estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Standard deviation of the location by the Cramer-Rao bound, m; absent if it is infinite.
@@ -81,7 +81,7 @@ pub struct Locating {
 impl Locating {
     /// Creates the report of `plan`, and sets the errors in `cells`.
     ///
-    /// `None` without `[listen]`, and unless there is a single interferer, with an area.
+    /// `None` if the scenario has no `[listen]`, or does not have exactly one interferer, with an area.
     ///
     /// # Errors
     /// A text that says why the flight cannot be simulated.
@@ -150,7 +150,7 @@ fn is_located(scenario: &Scenario, cell: &Cell) -> bool {
     cell.error_m.is_some_and(|error| error <= LOCATED * apart_m)
 }
 
-/// Returns the positions at which the relays measure: those before an estimate, and the planned ones.
+/// Returns the positions at which relays measure: before the first estimate, and the planned ones.
 fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     let relays = plan.places.len() as f64;
     // Hops of equal length. For one or two relays also: the first hop half as long, and the last hop half as long.

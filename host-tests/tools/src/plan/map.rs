@@ -23,7 +23,7 @@ pub struct Feature {
     pub at: Vec<Geodetic>,
     /// True for a line on the ground without heights, for a globe that has its own terrain.
     pub is_clamped: bool,
-    /// Numbers of the object, such as its position and SIR. The name of each ends in its unit.
+    /// Numbers of the object, such as its position and SIR, with their names. Each name ends in the unit.
     pub numbers: Vec<(&'static str, Number)>,
 }
 
@@ -154,7 +154,7 @@ impl Map {
         })
     }
 
-    /// Adds the state of each hop above the terrain, and the ground below it.
+    /// Adds the state of each hop above the terrain, and the ground below the hop.
     ///
     /// The ground is on the map twice: with the heights of the elevation files, and clamped to the ground of the globe.
     #[must_use]
@@ -295,7 +295,7 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
 
 /// Returns the points at which a hop crosses the antimeridian, at longitude 180 and -180 degrees.
 ///
-/// The hop takes the shorter way between its ends. `None` if it does not cross.
+/// The hop is on the shorter of the two ways around the earth. `None` if it does not cross the antimeridian.
 fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let [lon, lat, high] = from;
     let [other_lon, other_lat, other_high] = to;

@@ -49,7 +49,7 @@ pub use altitude::solved;
 /// It takes some milliseconds; with free altitudes up to some seconds for fifty relays or more.
 ///
 /// # Errors
-/// [`NoPlan`]: the request is invalid, or cannot be met. If it cannot be met, the error has the best SIR found.
+/// [`NoPlan`]: the request is invalid, or cannot be met. If the request cannot be met, the error gives the best SIR.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() {
@@ -84,7 +84,7 @@ fn with_one_interferer(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, N
     }
 }
 
-/// Checks that the options of `ask` fit each other and the scenario.
+/// Checks that the options of `ask` are compatible with each other and with the scenario.
 fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     if ask.x_m.is_some() {
         only_one_way(scenario, "--x-m")?;
@@ -191,7 +191,7 @@ pub struct Plan {
     pub back: Option<WorstBack>,
     /// Name of the algorithm that found the positions.
     pub how: &'static str,
-    /// True if it is proven that no positions are better or no fewer relays suffice; false if unknown.
+    /// True if the plan is proven optimal: no positions are better, or no fewer relays suffice.
     pub proven: bool,
     /// Theorem that gave the position of a single relay; `None` if no theorem was used.
     pub theorem: Option<Theorem>,
@@ -255,7 +255,7 @@ impl Default for Why {
 pub enum NoPlan {
     /// The scenario is not a valid mission, or the request does not fit it, for this reason.
     Wrong(String),
-    /// The request cannot be met, for this reason. The number is the best SIR found, linear.
+    /// The request cannot be met, for this reason. The number is the best SIR found, linear; `None` if unknown.
     Unmet(Why, Option<f64>),
 }
 
@@ -271,8 +271,8 @@ impl From<Refusal> for NoPlan {
 impl Plan {
     /// Returns the SIR of the worst hop, linear.
     ///
-    /// In a plan for both directions an SIR toward Tx is first divided by `reverse`, the required fraction of the SIR
-    /// toward Rx.
+    /// In a plan for both directions of data, an SIR toward Tx is first divided by `reverse`. This is the required SIR
+    /// toward Tx as a fraction of the SIR toward Rx.
     pub fn sir(&self) -> f64 {
         let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
         self.back.map_or(there, |back| back.worst_both)
@@ -337,8 +337,8 @@ fn merit(radio: Option<&Radio>, scene: &Scene, places: &[impl Copy + Into<Place>
 
 /// Returns the plan with the fewest relays whose SIR is at least `target`.
 ///
-/// `plan` plans a number of relays, and `sir` returns the SIR of a plan. The search assumes that more relays do no
-/// worse.
+/// `plan` plans a number of relays, and `sir` returns the SIR of a plan. The search assumes that more relays never have
+/// a lower SIR.
 fn fewest_of<T>(
     target: f64,
     mut plan: impl FnMut(u16) -> Result<T, NoPlan>,
@@ -383,7 +383,7 @@ fn fewest_of<T>(
 /// Largest number of relays that the planner tries for a target.
 const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
-/// Mission, the relays' own profiles (power, altitude), and the indices of relays with fixed altitudes.
+/// Mission, the relays' profiles (power, altitude), and the indices of relays with fixed altitudes.
 struct ProfiledMission {
     mission: Mission,
     own: Vec<(u16, Profile)>,
@@ -441,10 +441,10 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the relays have no minimum separation, or if it costs no SIR.
+/// Returns true if the relays have no minimum separation, or if the separation costs no SIR.
 ///
-/// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR is then not
-/// higher, and `None` if it finds no chain.
+/// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR is not higher
+/// without the separation, and `None` if it finds no chain.
 fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
     let free = Scenario {
         min_separation_m: 0.0,
@@ -453,7 +453,7 @@ fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) 
     !(scenario.min_separation_m > 0.0) || is_as_good(&free) == Some(true)
 }
 
-/// Unit in which SIRs are shown to the user.
+/// Unit of the SIRs that are shown to the user.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Unit {
     /// SIR as a ratio of powers.

@@ -21,10 +21,10 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// Number of start chains that local search improves: those with the best SIRs.
+/// Number of start chains that local search improves. They are the ones with the best SIRs.
 const POLISHED: usize = 2;
 
-/// Largest number of real interferers that each give a start chain, as the only interferer.
+/// Largest number of start chains that are each planned for one real interferer alone.
 const ALONE: usize = 4;
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
@@ -60,7 +60,7 @@ pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPla
     }
 }
 
-/// Returns the scenario with the hypothetical interferer in place of all others.
+/// Returns the scenario with the hypothetical interferer in place of all real interferers.
 pub(super) fn with_one(scenario: &Scenario, one: &Hypothetical) -> Scenario {
     let mut source = one.source();
     // Power limit of a mission. Only the fit of interferers near this limit exceeds it.
@@ -81,8 +81,8 @@ struct Planner<'a> {
 
 /// Two candidate chains with the same number of relays.
 ///
-/// One is the best chain for the hypothetical interferer, the other the best chain found against the sum of all real
-/// interferers.
+/// The first is the best chain for the hypothetical interferer, the second the best chain found against the sum of all
+/// real interferers.
 struct Candidates {
     scene: Scene,
     relays: u16,
@@ -197,8 +197,9 @@ impl Planner<'_> {
 
     /// Returns scenarios with a single interferer. Their best chains are further start chains.
     ///
-    /// They vary the scenario of the hypothetical interferer. This interferer is mirrored at the line Tx-Rx, or
-    /// replaced by one of the first real interferers; or relays may leave the line to one side only, or not at all.
+    /// The scenarios are variations of the one with the hypothetical interferer. This interferer is mirrored about the
+    /// line Tx-Rx, or replaced by one of the first real interferers. Or relays may leave the line to one side only, or
+    /// not at all.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();
@@ -233,7 +234,7 @@ impl Planner<'_> {
 
     /// Returns the plan with the fewest relays that give every hop the SIR `target`.
     ///
-    /// The search assumes that more relays do no worse.
+    /// The search assumes that more relays never have a lower SIR.
     fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
         let found = fewest_of(target, |relays| self.candidates(relays), Candidates::sir)?;
         found.chosen(self, Some(target))
@@ -249,8 +250,8 @@ impl Candidates {
 
     /// Returns the chain for the hypothetical interferer if it suffices, else the best chain found.
     ///
-    /// With a `target` the SIR suffices if it is at least `target`. Without one it suffices if it is at most 1 % below
-    /// the SIR of the best chain against all interferers.
+    /// If there is a `target`, the chain suffices if its SIR is at least `target`. Otherwise it suffices if its SIR is
+    /// at most 1 % below that of the best chain against all interferers.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, value)| *value);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.value);
@@ -368,16 +369,16 @@ fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best
     Some(Best { proven, ..best })
 }
 
-/// Widths of the first and the last moves for a larger rate, as fractions of the distance Tx-Rx.
+/// Lengths of the first and the last trial moves of a search, as fractions of the distance Tx-Rx.
 const MOVES: [f64; 2] = [1.0 / 16.0, 1e-5];
-/// Relative gain of a round of moves below which the width is halved.
+/// Relative increase of the data rate in a round of moves, below which the moves are halved.
 const GAIN: f64 = 1e-4;
 /// Rounding error allowed in the distance of two relays, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 2e-7;
 
 /// Returns the chain `start` after moves that raise its data rate.
 ///
-/// A move shifts one relay, or all relays up to it, or all relays from it on, along one coordinate.
+/// A move shifts relay k, or relays 1 to k, or relays k to N, along one coordinate.
 fn faster(radio: &Radio, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
     let (d, band) = (scene.distance_m, scene.band);
     let moved = |at: Place, holds: bool, axis: usize, by: f64| match axis {

@@ -27,12 +27,12 @@
 
 use uav_relay_scenario::scene::Scene;
 
-/// Best position of the only relay, for data in both directions.
+/// Best position of a single relay, for data in both directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Best {
     /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
-    /// Reason for the position: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
+    /// Reason for the position. 1: above Tx, 2: above Rx, 3: two SIRs are equal there, 4: one SIR is maximal there.
     pub case: u8,
     /// Explanation, for the user, of why the relay goes to its position.
     pub words: String,
@@ -52,7 +52,7 @@ const EQUAL: f64 = 1e-6;
 /// Coefficients of a polynomial, from the constant term to the highest power.
 type Polynomial = Vec<f64>;
 
-/// Returns the best position of a single relay for both directions; `None` if every SIR is 0.
+/// Returns the best position of a single relay for data in both directions; `None` if every SIR is 0.
 ///
 /// The SIR toward Tx needs to be only `reverse` (above 0) times the SIR toward Rx.
 pub fn best(scene: &Scene, reverse: f64) -> Option<Best> {

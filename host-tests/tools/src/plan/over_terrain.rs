@@ -37,13 +37,13 @@ const POINTS: f64 = 800.0;
 /// Number of points of a profile at the end of the search: all of them, as in reports.
 pub(super) const FINE_POINTS: f64 = f64::INFINITY;
 
-/// Smallest distance between columns of the grid, m, at which hilltops between them are tried, too.
+/// Smallest distance between columns of the grid, m, at which hilltops between columns are tried, too.
 const WIDE_M: f64 = 100.0;
 
 /// Number of finer grids, each with cells half as large.
 const REFINEMENTS: i32 = 5;
 
-/// Factor on the gain of a blocked hop. Every chain with a blocked hop then ranks behind all others.
+/// Factor on the SIR of a blocked hop. Every chain with a blocked hop then ranks behind all chains without one.
 const BLOCKED: f64 = 1e-30;
 
 /// Number of grid points on each side of a relay in a finer grid.
@@ -54,10 +54,10 @@ const AROUND: i32 = 2;
 pub struct OverTerrain {
     /// SIR of the worst hop with terrain at the positions that ignore the terrain, dB.
     ///
-    /// Absent without such positions.
+    /// Absent if there are no such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
-    /// Gain of the plan compared with the positions that ignore the terrain, dB.
+    /// SIR of the plan minus the SIR at the positions that ignore the terrain, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_gain_db: Option<f64>,
     /// Reason why the positions that ignore the terrain cannot be flown, or do not exist.
@@ -106,7 +106,7 @@ pub struct Search<'a> {
     /// Least and greatest height above the ground, m.
     clearance_m: [f64; 2],
     position_error_m: f64,
-    /// True if the scenario's range of altitudes limits the altitudes, too.
+    /// True if altitudes must also be within the scenario's range of altitudes.
     is_banded: bool,
     losses: HashMap<[[u64; 2]; 2], f64>,
     no_fly: Vec<NoFly>,
@@ -274,13 +274,13 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the position at `x_m` and the altitude `h_m`, whether it is permitted or not.
+    /// Returns the position at `x_m` and the altitude `h_m`, even if it is not permitted.
     pub(super) fn candidate(&self, x_m: f64, h_m: f64) -> Result<Candidate, String> {
         let amsl_m = self.datum_m(x_m)? + h_m;
         Ok(Candidate { x_m, h_m, amsl_m })
     }
 
-    /// Returns the SIR of a chain's worst hop, linear; much less if a position is not permitted.
+    /// Returns the SIR of a chain's worst hop, linear, reduced to nearly 0 if a position is not permitted.
     ///
     /// Every chain with such a position ranks behind all chains without one.
     pub(super) fn rank(&mut self, chain: &[Candidate]) -> Result<f64, String> {
@@ -305,7 +305,7 @@ impl<'a> Search<'a> {
         Ok(factor * self.worst_sir(chain))
     }
 
-    /// Returns candidates at the highest point of each column of the grid; none in narrow columns.
+    /// Returns candidates at the highest point of each column of the grid; none if the columns are narrow.
     ///
     /// Hilltops between two columns of the grid are then candidates, too. Columns are narrow below [`WIDE_M`].
     fn crests(&self, relay: usize, columns: u32, levels: u32) -> Result<Vec<Candidate>, String> {
@@ -359,7 +359,8 @@ impl<'a> Search<'a> {
 
     /// Returns the SIR of the hop to node `node` in free space, linear.
     ///
-    /// For both directions it is the smaller SIR of the two, with the SIR toward Tx divided by `reverse`.
+    /// For data in both directions it is the smaller of two values: the SIR toward Rx, and the SIR toward Tx divided by
+    /// `reverse`.
     fn free_sir(&self, node: usize, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let place = |at: Candidate| (at.x_m, at.h_m);
         let relays = &self.scene.relays;
@@ -397,7 +398,7 @@ impl<'a> Search<'a> {
         there
     }
 
-    /// Returns the gain of a hop by diffraction, 0 to 1, times [`BLOCKED`] if the terrain blocks the hop.
+    /// Returns the diffraction factor of a hop's SIR, 0 to 1, times [`BLOCKED`] if terrain blocks the hop.
     fn gain(&mut self, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let [tx, rx] = self.ground.ends;
         let end = |node: Node| Candidate {
@@ -462,7 +463,8 @@ impl<'a> Search<'a> {
 
     /// Returns the best chain of the candidates, and the SIR of its worst hop, linear.
     ///
-    /// `None` if no chain has at least the SIR `floor`. Hops below it are left out, so that a high floor saves time.
+    /// `None` if no chain has at least the SIR `floor`. Hops with an SIR below `floor` are left out, so that a high
+    /// `floor` saves time.
     pub fn best(
         &mut self,
         candidates: &[Vec<Candidate>],

@@ -24,7 +24,7 @@ use uav_relay_scenario::scene::{Relay, Scene};
 
 /// Number of equal intervals of the first grid of x.
 ///
-/// If the minimum separation exceeds half of this spacing, the spacing is the separation or a whole fraction of it.
+/// If the minimum separation exceeds half an interval, the interval is the separation or a whole fraction of it.
 const EVEN: f64 = 700.0;
 
 /// Largest number of equally spaced points in the first grid of x.
@@ -52,7 +52,7 @@ const NARROWEST: f64 = 1e-7;
 /// Rounding error allowed in the distance of two positions, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 1.2e-7;
 
-/// Weight of a very small extra time: of equal times, the one with the higher SIR is then better.
+/// Weight of a very small extra time, by which the higher SIR is preferred if two times are equal.
 ///
 /// Hops at the same rate step of a radio have equal times.
 const GUIDE: f64 = 1e-3;
@@ -133,7 +133,7 @@ impl<'a> Times<'a> {
         self.point(usize::MAX, self.scene.distance_m)
     }
 
-    /// Returns the hop from relay `from` to relay `to`, counted from 1; `None` is Tx or Rx.
+    /// Returns the hop from relay `from` to relay `to`, counted from 1; `None` stands for Tx or Rx.
     pub(super) fn hop(&self, from: Option<usize>, to: Option<usize>) -> Hop {
         let [low, high] = [from, to].map(|node| node.and_then(|node| self.relay(node)));
         let climb =
@@ -174,7 +174,7 @@ impl<'a> Times<'a> {
 
     /// Returns the time of a hop for one bit, s Hz, as [`Times::time`] does.
     ///
-    /// `apart` is its length along x, m. `disturbances_w` are interference plus noise at its two nodes, W.
+    /// `apart` is the hop's length along x, m. `disturbances_w` are interference plus noise at the hop's two nodes, W.
     pub(super) fn time_at(
         &self,
         hop: &Hop,
@@ -206,16 +206,16 @@ impl<'a> Times<'a> {
 
     /// Returns a very small time that falls as the SIR rises, s Hz.
     ///
-    /// It is added to the time for one bit. Of two chains with equal times, the chain with the higher SIR is then
-    /// better.
+    /// It is added to the time for one bit. If two chains have equal times, the chain with the higher SIR is then
+    /// preferred.
     fn guide(sir: f64) -> f64 {
         GUIDE / libm::log1p(sir)
     }
 
     /// Returns the time of a chain for one bit, s Hz, with the relays at `x`, m.
     ///
-    /// It is infinite if the chain carries nothing, or if relays are closer than the minimum separation, apart from
-    /// rounding.
+    /// It is infinite if the chain carries nothing, or if relays are closer than the minimum separation less a rounding
+    /// error.
     pub fn total(&self, x: &[f64]) -> f64 {
         self.along(x, false)
     }
@@ -263,7 +263,8 @@ impl<'a> Times<'a> {
 
     /// Improves the positions `start` by repeated searches in windows around all relays.
     ///
-    /// The windows shrink when they no longer help. Returns the time of the best chain, s Hz, and its positions.
+    /// The windows shrink when a search no longer reduces the time. Returns the time of the best chain, s Hz, and its
+    /// positions.
     pub fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let d = self.scene.distance_m;
         let mut x = start.to_vec();
@@ -331,7 +332,7 @@ struct Best {
     before: usize,
 }
 
-/// State of the dynamic programming: the best chains from Tx to each grid point of each relay.
+/// State of the dynamic programming: the best chain from Tx to each grid point of each relay.
 struct Layers<'a> {
     times: &'a Times<'a>,
     layers: Vec<(Vec<Point>, Vec<Best>)>,

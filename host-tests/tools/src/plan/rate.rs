@@ -16,19 +16,19 @@ use uav_relay_sim::report::HopSlots;
 use super::carried::{Carried, carries_no};
 use super::{NoPlan, Number, Plan, PlanRequest, source};
 
-/// Largest number of relays tried, if a plan takes milliseconds.
+/// Largest number of relays that is tried if a plan takes only milliseconds.
 const MOST_FAST: u16 = 200;
 
-/// Largest number of relays tried, if a plan takes seconds.
+/// Largest number of relays that is tried if a plan takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Largest number of relays tried, if positions are optimised for the rate.
+/// Largest number of relays that is tried if positions are optimised for the data rate.
 const MOST_SEARCHED: u16 = 60;
 
 /// Number of relays up to which rates are always computed with fitted time slots.
 ///
-/// A fitted slot is as long as its hop needs. The list of rates is shorter only if so many relays do not fit between Tx
-/// and Rx, or if more relays provably do not increase the rate.
+/// A fitted slot is as long as its hop needs. The list of rates is shorter only if fewer relays fit between Tx and Rx,
+/// or if more relays provably do not increase the rate.
 const LEAST_LISTED: u16 = 10;
 
 /// Data rate of a chain, bit/s.
@@ -37,7 +37,7 @@ const LEAST_LISTED: u16 = 10;
 pub enum Rate {
     /// Rate from Tx to Rx, bit/s, of a chain for this direction only.
     There(f64),
-    /// Rates to Rx and to Tx, bit/s, of a chain for both directions.
+    /// Rates to Rx and to Tx, bit/s, of a chain for data in both directions.
     Both([f64; 2]),
 }
 
@@ -62,7 +62,7 @@ impl Rate {
         }
     }
 
-    /// Returns the linear SIRs of all hops: in the direction to Rx, and in the direction to Tx.
+    /// Returns the linear SIRs of all hops: for data toward Rx, and for data toward Tx.
     ///
     /// `None` for a plan of one direction.
     fn both_sirs(plan: &Plan, scenario: &Scenario) -> Option<[Vec<f64>; 2]> {
@@ -78,7 +78,7 @@ impl Rate {
 
     /// Returns the time slots of the hops in `plan`.
     ///
-    /// Empty if the chain carries no data, or if the slots are not fitted (each as long as its hop needs).
+    /// Empty if the chain carries no data, or if all slots are equally long.
     pub fn hop_slots(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Vec<HopSlots> {
         if radio.link.access != Access::Fitted {
             return Vec::new();
@@ -116,7 +116,8 @@ pub struct BestRate {
     pub best_uavs: u16,
     /// Largest data rate, bit/s.
     ///
-    /// For both directions it is the smaller of two rates: to Rx, and to Tx divided by the required fraction.
+    /// For data in both directions it is the smaller of two values: the rate to Rx, and the rate to Tx divided by the
+    /// required fraction.
     pub best_rate_bps: f64,
     /// Largest number of relays tried. All numbers from 1 on were tried.
     pub tried_uavs: u16,
@@ -139,8 +140,8 @@ impl Rates {
     /// Plans 1, 2, 3 and more relays, and computes their data rates over `radio`.
     ///
     /// It ends when a larger number is proven to carry no more, or at a limit of some seconds. `target_bps` is the
-    /// wanted rate to Rx. For both directions, the rate to Tx must be at least `target_bps` times the scenario's
-    /// `reverse`.
+    /// wanted rate to Rx. For data in both directions, the rate to Tx must be at least `target_bps` times the
+    /// scenario's `reverse`.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
@@ -248,7 +249,7 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     }
 }
 
-/// Relative gain in rate from which on a larger number of relays counts as better.
+/// Relative increase of the rate at which a larger number of relays counts as better.
 const RISE: f64 = 1e-4;
 
 /// Largest number of relays in a proof by [`carry_no_more`].
@@ -256,7 +257,7 @@ const MOST_PROVEN: u16 = MOST_FAST;
 
 /// Returns true if it is proven that no number of relays up to `tried_uavs` carries more than `best`.
 ///
-/// The data is for both directions, in equal slots or with a frequency for each hop.
+/// The data are for both directions, in equal slots or with a frequency for each hop.
 fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
     let more_bps = best.best_rate_bps * (1.0 + 2.0 * tolerance);
     best.tried_uavs <= MOST_PROVEN
@@ -277,7 +278,7 @@ struct MostRate {
     first_bps: f64,
     /// Upper bound on the rate of a hop between two relays at their minimum separation, bit/s.
     relay_bps: f64,
-    /// Number of directions of the data: 1.0 to Rx only, 2.0 for both.
+    /// Number of directions of the data: 1.0 for data to Rx only, 2.0 for data to Rx and to Tx.
     ways: f64,
 }
 
@@ -295,8 +296,8 @@ impl MostRate {
 
     /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s.
     ///
-    /// For both directions the data rate is the smaller of two rates: to Rx, and to Tx divided by the required
-    /// fraction.
+    /// For data in both directions, the rate of a chain is the smaller of two values: the rate to Rx, and the rate to
+    /// Tx divided by the required fraction.
     fn of(&self, radio: &Radio, relays: u16) -> f64 {
         let relays = f64::from(relays);
         match radio.link.access {
@@ -347,7 +348,7 @@ fn most_between(scenario: &Scenario) -> [f64; 2] {
 
 /// Returns an upper bound on the linear SIR at Rx for any number of relays, from the SIR in `plan`.
 ///
-/// The interference at Rx does not depend on the relays. The signal is largest from a relay right above Rx, at the
+/// The interference at Rx does not depend on the relays. The signal is largest from a relay vertically above Rx, at the
 /// lowest altitude and with the largest power.
 fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
     let (Some((last, profile)), Some(sir)) = (plan.places.last(), plan.sirs.last()) else {

@@ -42,12 +42,12 @@ pub struct HypotheticalReport {
     pub kept: bool,
     /// Loss of SIR at the positions for the hypothetical interferer, relative to the plan's SIR.
     ///
-    /// 0 if the plan has these positions. With fitted slots it is the loss of data rate.
+    /// 0 if the plan has these positions. If the slots are fitted, it is the loss of data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// Gain of SIR of the plan, relative to the positions for the hypothetical interferer.
+    /// SIR of the plan divided by the SIR at the positions for the hypothetical interferer, minus 1.
     ///
-    /// With fitted slots it is the gain of data rate.
+    /// If the slots are fitted, it is the same ratio of the data rates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
     /// True if the data rate decides which positions are better, because the time slots are fitted.
@@ -55,22 +55,23 @@ pub struct HypotheticalReport {
     by_rate: bool,
 }
 
-/// Data rates of a planned chain, and of other numbers of relays.
+/// Data rates of a planned chain, and of chains with different numbers of relays.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
     /// Data rate of the chain, bit/s; absent without a plan.
     ///
-    /// A plan for both directions also has the rate toward Tx.
+    /// A plan for data in both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<Rate>,
     /// Data rate of the worst hop during its time slot, bit/s.
     ///
-    /// A plan for both directions also has the rate toward Tx.
+    /// A plan for data in both directions also has the rate toward Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<Rate>,
     /// Number of time slots that the hops share.
     ///
-    /// On one frequency it is one per hop and direction. With a frequency for each hop it is one per direction.
+    /// On one frequency, each hop has a slot for each direction of data. If each hop has its own frequency, there is
+    /// one slot for each direction of data, in which all hops send.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
     /// Time slot of each hop and direction; empty unless `link.access` is `fitted`.
@@ -86,7 +87,7 @@ pub struct RateReport {
     /// Number of relays with the largest data rate, and that rate.
     #[serde(flatten)]
     pub best: BestRate,
-    /// Data rate for each number of relays tried; empty unless the user wants the list.
+    /// Data rate for each number of relays tried; empty unless the user requests the list.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rates: Vec<RateOf>,
     /// Number of relays in the plan; 0 without a plan.
@@ -101,7 +102,7 @@ pub struct RateReport {
 }
 
 impl RateReport {
-    /// Creates the report of the rates of `plan`. `best` is the largest rate, and `rates` are those to list.
+    /// Creates the report of the rates of `plan`. `best` is the largest rate, and `rates` are the rates to list.
     ///
     /// Without a plan the report has only `best` and `rates`.
     pub fn new(
@@ -234,7 +235,7 @@ const fn relays_carry(number: u16) -> (&'static str, &'static str) {
 
 /// SIRs of the hops in the direction from Rx to Tx.
 ///
-/// `reverse`, `worst_both` and `worst_direction` are present if the relays are placed for both directions.
+/// `reverse`, `worst_both` and `worst_direction` are present if the relays are placed for data in both directions.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WayBack {
     /// SIR of the hop from Rx to the last relay, linear.
@@ -246,7 +247,7 @@ pub struct WayBack {
     /// Required SIR toward Tx as a fraction of that toward Rx; absent in a plan for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
-    /// SIR of the worst hop of both directions, linear; SIRs toward Tx are first divided by `reverse`.
+    /// SIR of the worst hop toward Rx or Tx, linear; SIRs toward Tx are first divided by `reverse`.
     ///
     /// Absent in a plan for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -256,7 +257,7 @@ pub struct WayBack {
     /// SIRs toward Tx are first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_direction: Option<&'static str>,
-    /// Receiver of the worst hop in the direction from Rx to Tx: 0 for Tx, otherwise the relay's index.
+    /// Node that receives the worst hop for data from Rx to Tx: 0 for Tx, otherwise a relay's index.
     #[serde(skip)]
     hop: usize,
     #[serde(skip)]
@@ -314,14 +315,14 @@ pub struct PlanReport {
     pub best_sir_db: Option<f64>,
     /// SIR of the plan's worst hop, linear.
     ///
-    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
-    /// fraction of the SIR toward Rx.
+    /// In a plan for data in both directions, hops toward Rx and hops toward Tx count. An SIR toward Tx is first
+    /// divided by its required fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the plan's worst hop, dB.
     ///
-    /// In a plan for both directions, the hops of both count. An SIR toward Tx is first divided by the required
-    /// fraction of the SIR toward Rx.
+    /// In a plan for data in both directions, hops toward Rx and hops toward Tx count. An SIR toward Tx is first
+    /// divided by its required fraction of the SIR toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
     /// SIRs in the direction from Rx to Tx; absent if the interference at Tx is unknown.
@@ -352,7 +353,7 @@ pub struct PlanReport {
     pub proven: Option<bool>,
     /// Number of the theorem that placed the only relay, 1 to 3 as in the paper.
     ///
-    /// 4 is one relay with a lateral offset, and 5 one relay for both directions. Both are not in the paper.
+    /// 4 is one relay with a lateral offset, and 5 one relay for data in both directions. Neither is in the paper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
     /// Case number of the theorem in the paper; 0 for a case that the paper omits.
@@ -383,10 +384,10 @@ pub struct PlanReport {
     /// Terrain below the chain; absent without elevation files.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub terrain: Option<TerrainReport>,
-    /// Gain of positions chosen for the terrain; absent for other positions.
+    /// Comparison with positions that ignore the terrain; absent if the plan ignores it, too.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub over_terrain: Option<OverTerrain>,
-    /// Flight over the terrain, and the chain after each relay's loss; absent without elevation files.
+    /// Flight over the terrain, and the chain after the loss of each relay; absent without elevation files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flight: Option<Flight>,
     /// Reason why the flight over the terrain was not simulated; absent if it was.
@@ -395,7 +396,7 @@ pub struct PlanReport {
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
-    /// Location of the interferer in its area by relays; absent without `[listen]`.
+    /// Results of how well relays locate the interferer in its area; absent without `[listen]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub locating: Option<Locating>,
     /// True if relays may have a lateral position. The table then has a column for y.
@@ -680,7 +681,7 @@ pub struct NoiseReport {
 impl NoiseReport {
     /// Returns the noise of a scenario with its parameters.
     ///
-    /// `None` without noise, or if the scenario gives the noise power itself.
+    /// `None` if there is no noise, or if the scenario gives the noise power itself.
     pub fn of(noise: &Noise) -> Option<Self> {
         let power_w = noise.receiver_w();
         let is_made = noise.power_dbm.is_none() && power_w > 0.0;

@@ -38,7 +38,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
     })
 }
 
-/// Returns the best x of one relay for both directions. It keeps its altitude, and y = 0.
+/// Returns the best x of one relay for data in both directions. The relay keeps its altitude, and has y = 0.
 pub(super) fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, 1, tolerance)?;
     let altitude_m = briefed.profile(1).altitude_m;
@@ -60,7 +60,7 @@ pub(super) fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Pla
     })
 }
 
-/// Returns true if it is proven that no positions of `relays` relays meet `target` in both directions.
+/// Returns true if it is proven that no positions of `relays` relays meet `target` toward Rx and Tx.
 ///
 /// The proof shares no code with Algorithm 1, whose result it confirms.
 pub(super) fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
@@ -71,7 +71,7 @@ pub(super) fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f6
     Scene::new(scenario, relays).is_some_and(|scene| excludes(&scene, targets))
 }
 
-/// Returns the best positions of Algorithm 1 for both directions, marked as proven if a proof is found.
+/// Returns the best positions of Algorithm 1 for data in both directions; `proven` if there is a proof.
 pub(super) fn best_both_ways(
     scenario: &Scenario,
     relays: u16,
@@ -85,7 +85,7 @@ pub(super) fn best_both_ways(
 
 /// Returns the best position of a single relay by a closed solution, such as Theorem 1.
 ///
-/// A relay with a fixed altitude has no lateral offset.
+/// If the relay has a fixed altitude, its lateral offset is 0.
 pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);

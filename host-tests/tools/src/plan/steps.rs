@@ -28,21 +28,21 @@ use super::path::{Hop, Point, Times};
 /// Number of equal cells between Tx and Rx.
 const CELLS: u16 = 800;
 
-/// Smallest relative gain in a chain's time for one bit that the search looks for.
+/// Smallest relative decrease of a chain's time for one bit that the search looks for.
 const GAIN: f64 = 2e-5;
 
 /// Largest relative difference of two chains' times for one bit that count as equal.
 ///
-/// Of two such chains the search keeps the one whose last relay is farther from Tx.
+/// If two chains have equal times, the search keeps the one whose last relay is farther from Tx.
 const SAME: f64 = 1e-4;
 
-/// Backward loss of hop length that the search neglects, as a fraction of the distance Tx-Rx.
+/// Loss of hop length toward Tx that the search neglects, as a fraction of the distance Tx-Rx.
 const SLIGHT: f64 = 1e-6;
 
 /// Number of bisection steps, within one cell, for the farthest x at which a hop meets a rate step.
 const HALVINGS: u8 = 40;
 
-/// First hops of a chain, up to the relay at `point`. They need `time` for one bit, s Hz.
+/// Beginning of a chain: the hops from Tx to the relay at `point`. Together they need `time` for one bit, s Hz.
 #[derive(Clone, Copy)]
 struct Label {
     point: Point,
@@ -200,7 +200,7 @@ impl Search<'_> {
 
     /// Returns lower bounds on the time for one bit of all hops after a relay, s Hz.
     ///
-    /// There is a row for each relay, with a value for each cell that the relay may be in.
+    /// There is a row for each relay, with a value for each cell of the relay.
     fn bounds(&self, kinds: &[Rc<Reaches>]) -> Vec<Vec<f64>> {
         let relays = kinds.len();
         let (last, rx) = (self.times.hop(Some(relays), None), self.times.rx());
@@ -289,7 +289,7 @@ impl Search<'_> {
 
     /// Collects in `ends` the x of relay `node`, m, at which its hop from `from` just meets a rate step.
     ///
-    /// Both directions of the hop count. The x of Rx is included. The list is not sorted.
+    /// The hop counts in both directions of data. The x of Rx is included. The list is not sorted.
     fn ends(&self, from: Point, node: usize, kind: &Reaches, ends: &mut Vec<f64>) {
         ends.clear();
         ends.push(self.times.scene.distance_m);
@@ -323,8 +323,8 @@ impl Search<'_> {
 
     /// Returns those of `labels` (first hops of chains) that can lead to the best chain.
     ///
-    /// A label is left out if another label ends farther from Tx, takes no more time, and is no worse for data to Tx.
-    /// It is no worse if it receives the next node from as far away.
+    /// Label a is left out if a label b ends farther from Tx, takes no more time, and is no worse for data to Tx. b is
+    /// no worse if it receives the next node from as far away as a does.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -404,7 +404,7 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the smallest x, m, from which on no position before `point` is better than `point`.
+    /// Returns the smallest x, m, such that no position from there to `point` is better than `point`.
     ///
     /// A position is better if it receives the next node from a larger x, at some rate step of the direction to Tx.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
@@ -438,7 +438,7 @@ fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     to.x - squared.sqrt()
 }
 
-/// Returns the longest hop along x, m, from the next node to `to` with the SINR `sinr`.
+/// Returns the largest distance along x, m, at which `to` receives the next node with the SINR `sinr`.
 ///
 /// `None` if the next node is too weak at any x.
 fn reach(hop: &Hop, sinr: f64, to: Point) -> Option<f64> {
@@ -446,7 +446,7 @@ fn reach(hop: &Hop, sinr: f64, to: Point) -> Option<f64> {
     (squared >= 0.0).then(|| squared.sqrt())
 }
 
-/// Returns the largest f32 number that is not above `x`.
+/// Returns the largest f32 number that is at most `x`.
 fn below(x: f64) -> f64 {
     let near = narrow(x);
     if f64::from(near) > x {

@@ -22,15 +22,15 @@ pub const POSITION_ERROR_M: f64 = 1.0;
 /// Elevation model of a scenario.
 #[expect(missing_debug_implementations, reason = "millions of heights")]
 pub struct Elevation {
-    /// Terrain of the scenario. With `--dem`, its files are those of the option.
+    /// Terrain of the scenario. If the option `--dem` is given, the files are those of the option.
     pub spec: TerrainSpec,
     terrain: Terrain,
-    /// Position error of the relays, m. Obstacles within it count as below the relay.
+    /// Position error of the relays, m. Obstacles within this distance count as below the relay.
     position_error_m: f64,
 }
 
 impl Elevation {
-    /// Reads the elevation files in `dem`, or else of the scenario; `None` if there are no files.
+    /// Reads the elevation files `dem`, or without any, those of the scenario; `None` without any file.
     ///
     /// # Errors
     /// A text that names the file and the problem.
@@ -116,7 +116,7 @@ impl Elevation {
         Ok(each.collect())
     }
 
-    /// Returns the lowest and the highest ground at most `aside_m` beside the line Tx-Rx, m above the sea.
+    /// Returns the lowest and the highest ground within `aside_m` of the line Tx-Rx, m above the sea.
     ///
     /// The highest ground includes the assumed error of the heights.
     ///

@@ -28,7 +28,7 @@ use super::{NoPlan, Plan, ProfiledMission, source};
 /// Number of altitudes that are tried for each relay.
 const LEVELS: u32 = 40;
 
-/// Largest number of searches for altitudes. Each uses the x that the relays choose at the previous altitudes.
+/// Largest number of searches for altitudes. Each search uses the x that the relays choose at the previous altitudes.
 const ROUNDS: u32 = 6;
 
 /// First and last change of one relay's altitude in the search, m.
@@ -37,7 +37,7 @@ const STEPS_M: [f64; 2] = [16.0, 0.5];
 /// Largest relative loss of SIR that is accepted for higher, safer altitudes: 0.01 dB.
 const SLACK: f64 = 0.0023;
 
-/// Smallest relative gain in SIR that makes the search accept other altitudes.
+/// Smallest relative increase of the SIR at which the search accepts new altitudes.
 const GAIN: f64 = 1e-4;
 
 /// Explanation of "room" for the user.
@@ -77,7 +77,7 @@ impl Trial {
     }
 }
 
-/// Returns the scenario with an altitude for each relay, so that the chain is good over the terrain.
+/// Returns the scenario with altitudes of the relays that give the chain a high SIR over the terrain.
 ///
 /// The search begins with the altitudes of `plan`, a plan over the terrain.
 ///
@@ -173,22 +173,22 @@ pub struct FlownRelay {
     pub altitude_m: f32,
     /// Room, m: interval of x in which no hop gets worse while the neighbours are in their rooms.
     ///
-    /// It contains no no-fly area. Absent if there is no room.
+    /// The room contains no no-fly area. Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub room_m: Option<[f64; 2]>,
 }
 
-/// Chain over the terrain after the loss of one relay, when the other relays have closed the gap.
+/// Chain over the terrain after the loss of one relay, when the remaining relays have closed the gap.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Without {
     /// Number of the lost relay.
     pub lost: u16,
-    /// SIR of the worst hop with terrain, dB; absent if the other relays find no positions.
+    /// SIR of the worst hop with terrain, dB; absent if the remaining relays find no positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_sir_db: Option<f64>,
     /// Problems of this chain; absent if there are none.
     ///
-    /// A hop is blocked, or a relay or its path is too low or in a no-fly area.
+    /// A problem is a blocked hop, or a relay or its path that is too low or in a no-fly area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
@@ -203,7 +203,7 @@ pub struct Flight {
     pub loss_db: Option<f64>,
     /// Largest distance of a relay from its position in the plan for the terrain, m.
     ///
-    /// Absent without such a plan.
+    /// Absent if there is no such plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Positions of the relays.
@@ -218,7 +218,7 @@ pub struct Flight {
     pub without: Vec<Without>,
     /// Reason why the relays cannot fly over this terrain; `None` if they can.
     ///
-    /// A hop is blocked, or a relay is too low or too high.
+    /// A reason is a blocked hop, or a relay that is too low or too high.
     #[serde(skip)]
     pub problem: Option<String>,
 }
@@ -435,18 +435,18 @@ fn settled(
     Ok(ProfiledMission::new(scenario, relays, tolerance)?.plan(places, "", false))
 }
 
-/// Positions of the other relays after the loss of one relay, in a simulated flight.
+/// Positions of the remaining relays after the loss of one relay, in a simulated flight.
 struct Loss {
     lost: u16,
-    /// Numbers of the other relays.
+    /// Numbers of the remaining relays.
     left: Vec<u16>,
-    /// Positions of the other relays; `None` if they agree on none.
+    /// Positions of the remaining relays; `None` if they agree on none.
     places: Option<Vec<Placement>>,
 }
 
 /// Simulates the flight of `relays` relays, and then the loss of each of them.
 ///
-/// Returns the positions before a loss, and the losses; none for a single relay.
+/// Returns the positions before a loss, and the losses; no losses for a single relay.
 fn losses(
     scenario: &Scenario,
     relays: u16,
@@ -481,12 +481,12 @@ fn losses(
     Ok((places, losses.into_iter().collect::<Result<_, _>>()?))
 }
 
-/// Text for the user if the other relays agree on no positions after a loss.
+/// Text for the user if the remaining relays agree on no positions after a loss.
 const NOWHERE: &str = "the other relays find no positions";
 
-/// Returns a warning for each relay whose loss leads another relay into a no-fly area.
+/// Returns a warning for each relay whose loss leads a remaining relay into a no-fly area.
 ///
-/// The flight is simulated without terrain. There are no warnings without no-fly areas.
+/// The simulated flight ignores the terrain. There are no warnings if there are no no-fly areas.
 ///
 /// # Errors
 /// [`NoPlan`]: the simulated relays do not agree on positions.
@@ -507,7 +507,7 @@ pub fn no_fly_warnings(
     Ok(lines_of(&scenario.no_fly, &losses, &places))
 }
 
-/// Returns a text for each loss that leads another relay into a no-fly area.
+/// Returns a text for each loss that leads a remaining relay into a no-fly area.
 ///
 /// `places` are the positions before the loss.
 fn lines_of(no_fly: &[NoFly], losses: &[Loss], places: &[Placement]) -> Vec<String> {
@@ -523,14 +523,14 @@ fn lines_of(no_fly: &[NoFly], losses: &[Loss], places: &[Placement]) -> Vec<Stri
 }
 
 impl Loss {
-    /// Returns the positions of the other relays before the loss. `places` has all relays.
+    /// Returns the positions of the remaining relays before the loss. `places` has all relays.
     fn before(&self, places: &[Placement]) -> Vec<Placement> {
         let left = (1..).zip(places).filter(|(index, _)| *index != self.lost);
         left.map(|(_, place)| *place).collect()
     }
 }
 
-/// Checks terrain and no-fly areas below the other relays after each loss.
+/// Checks terrain and no-fly areas below the remaining relays after each loss.
 ///
 /// `places` are the positions before the loss.
 fn losses_over(
@@ -545,7 +545,7 @@ fn losses_over(
     without.into_iter().collect()
 }
 
-/// Checks terrain and no-fly areas below the other relays after one loss.
+/// Checks terrain and no-fly areas below the remaining relays after one loss.
 ///
 /// `places` are the positions before the loss.
 fn without(
@@ -633,7 +633,7 @@ mod tests {
     use super::{Flight, Loss, NOWHERE, losses_over};
     use crate::plan::terrain::Elevation;
 
-    /// Checks the text for the user if the other relays agree on no positions after a loss.
+    /// Checks the text for the user if the remaining relays agree on no positions after a loss.
     ///
     /// Simulated relays always agree on some, so the outcome is given here.
     #[test]

@@ -27,7 +27,7 @@ pub enum BlockError {
     Config(ConfigError),
     /// Error: the drone would reject the surveyed positions of Tx and Rx, for this reason.
     Course(CourseError),
-    /// Error: a drone would read another configuration from the block.
+    /// Error: a drone would not read this configuration from the block.
     Changed,
 }
 
@@ -103,7 +103,7 @@ pub struct Flight {
     sites: Option<Sites>,
     autopilot_key: Option<[u8; 32]>,
     network: u16,
-    /// Silence of a neighbour after which a relay probes it, ms; 0 selects the firmware's default.
+    /// Silence of a neighbour after which a relay requests heartbeats, ms; 0 for the firmware's default.
     probe_after_ms: u32,
 }
 
@@ -151,7 +151,7 @@ impl Flight {
         Self { method, ..self }
     }
 
-    /// Sets the time slots as `scenario` describes them, if the method is the joint method.
+    /// Sets the time slots to those of `scenario`, if the method is the joint method.
     ///
     /// # Errors
     /// [`BlockError::Refused`] if the relays cannot use slots that are as long as each hop needs.
@@ -168,7 +168,7 @@ impl Flight {
         Self { measure, ..self }
     }
 
-    /// Sets the silence of a neighbour after which a relay probes it, ms; 0 selects the firmware's default.
+    /// Sets the silence of a neighbour, ms, after which a relay requests heartbeats. 0 selects the firmware's default.
     pub fn with_probe_after(self, probe_after_ms: u32) -> Self {
         Self {
             probe_after_ms,
@@ -234,7 +234,7 @@ impl Flight {
     /// Builds the configuration block of relay `index`, and checks it by reading it back.
     ///
     /// # Errors
-    /// The drone would reject the block, or read back another configuration.
+    /// The drone would reject the block, or would read a different configuration from it.
     pub fn block(&self, index: u16) -> Result<Block, BlockError> {
         let own = self.own.iter().find(|(of, _)| *of == index);
         let config = Config {
@@ -284,7 +284,8 @@ fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     }
 }
 
-/// Returns the silence of a neighbour after which it is probed, and that after which it counts as lost.
+/// Returns two silences of a neighbour. After the first a relay requests heartbeats, after the second the neighbour is
+/// lost.
 ///
 /// 0 selects the firmware's default.
 pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
@@ -295,13 +296,13 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     [settings.probe_after, settings.dead_after]
 }
 
-/// Returns the silence of a neighbour, ms, after which a relay with this block probes it.
+/// Returns the silence of a neighbour, ms, after which a relay with this block requests heartbeats.
 ///
 /// It is `given_ms` from the command line, or else the value in the scenario's section `network`; 0 selects the
 /// firmware's default. `name` is the name of the scenario, for errors.
 ///
 /// # Errors
-/// A text with the key whose value no block can have, that value, and the allowed one.
+/// A text with the key whose value no block can have, this value, and the allowed value.
 pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> Result<u32, String> {
     let refuse = |key: &str, value: u32, own: u32, why: &str| {
         format!(

@@ -27,7 +27,7 @@ const WRITABLE: [&str; 2] = ["/var/lib/uav-relay", "/run/uav-relay"];
 /// Largest MAVLink system number of a drone. Ground stations have the next numbers.
 const MAX_SYSTEM: u16 = 250;
 
-/// Largest lateral distance of a take-off from the chain, m.
+/// Largest lateral distance from the chain at which a drone takes off, m.
 pub const ASIDE_M: f64 = 50.0;
 
 /// Largest radius and altitude of ArduCopter's fences, m.
@@ -305,7 +305,7 @@ impl Bundle<'_> {
 
     /// Returns the altitude above home at which relay `index` returns to launch, m.
     ///
-    /// The altitudes of two drones differ, because a returning drone crosses the paths of others. All are above the
+    /// The altitudes of any two drones differ, because returning drones cross each other's paths. All are above the
     /// chain and, if there is a terrain, above the ground between Tx and Rx.
     fn return_m(&self, index: u16) -> f64 {
         let [tx, rx] = self.line.sites.map(|site| f64::from(site.amsl_mm) / 1e3);
@@ -499,7 +499,7 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
 
 /// Moves the relative paths of `keys` into the folder that the systemd unit may write to.
 ///
-/// The keys name files that the program writes. A missing key stays missing.
+/// The keys name files that the program writes. A key that is missing is not added.
 ///
 /// # Errors
 /// An absolute path is in another folder.
@@ -551,7 +551,7 @@ fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
 /// Returns the udev rules for those of `ports` whose names begin with [`LINK`]. Other ports need none.
 ///
 /// # Errors
-/// A port name has other characters than letters, digits, `.`, `_` and `-`: in a rule they could be a command.
+/// A port name has characters other than letters, digits, `.`, `_` and `-`: in a rule they could form a command.
 fn rules(section: &dyn TableLike, ports: &[&str]) -> Result<String, String> {
     let paths = ports.iter().filter_map(|port| section.get(port)?.as_str());
     let links: Vec<&str> = paths

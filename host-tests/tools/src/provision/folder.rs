@@ -17,9 +17,9 @@ pub fn name(index: u16) -> String {
 
 /// Writes `files`, each a name and content, to the folder `dir`. Creates `dir` if necessary.
 ///
-/// With `force`, existing files are overwritten. All other configuration blocks in the folder are removed, because a
-/// drone would accept such a block of another flight. Temporary files are written first, and renamed at the end. If an
-/// error occurs before, the folder is unchanged.
+/// With `force`, existing files are overwritten. Configuration blocks in the folder that are not in `files` are
+/// removed, because a drone would accept a block of an earlier flight. Temporary files are written first, and renamed
+/// at the end. If an error occurs before, the folder is unchanged.
 ///
 /// # Errors
 /// A text that names the file or folder and the reason.

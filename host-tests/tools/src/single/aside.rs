@@ -114,8 +114,8 @@ pub enum AsideCase {
 impl AsideCase {
     /// Number of the case, 1 to 10.
     ///
-    /// Cases 1 to 3 are optima without limits; 4 to 6 are optima on edges along x, y and h. In cases 7 and 8 the
-    /// interferer is at Tx or Rx. Cases 9 and 10 occur only with noise.
+    /// Cases 1 to 3 are optima that the limits of x, y and h do not affect; 4 to 6 are optima on edges along x, y and
+    /// h. In cases 7 and 8 the interferer is at Tx or Rx. Cases 9 and 10 occur only with noise.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -133,8 +133,8 @@ impl AsideCase {
 /// Returns the optimal position of a relay with `profile`, and its case; `None` in a field.
 ///
 /// x is between Tx and Rx, and y in the allowed lateral range. The relay has the altitude of `profile`. Work: 48
-/// bisection steps in f64; with noise 48 further steps for each of them. If the optimum without limits is not allowed,
-/// some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
+/// bisection steps in f64; with noise 48 further steps for each of them. If the optimum is outside of the allowed
+/// ranges, some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
@@ -142,7 +142,7 @@ pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)
 /// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field.
 ///
 /// x is between Tx and Rx; y and altitude are in their allowed ranges. Work: 48 bisection steps in f64; with noise 48
-/// further steps for each of them. If the optimum without limits is not allowed, some 800 evaluations of both hops;
+/// further steps for each of them. If the optimum is outside of the allowed ranges, some 800 evaluations of both hops;
 /// with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
@@ -224,7 +224,7 @@ fn holds(band: Band, value: f32) -> bool {
     (band.least_m..=band.most_m).contains(&value)
 }
 
-/// Returns the optimal position of a single relay at `altitude_m`, without limits of x and y.
+/// Returns the optimal position of a single relay at `altitude_m`, if x and y are not limited.
 fn without_limits(
     mission: &Mission,
     interferer: &Interferer,
@@ -293,7 +293,7 @@ impl Plane {
 
     /// Returns the factor t of the position -t (X, Y) with the first hop's largest SIR.
     ///
-    /// The interferer is at (X, Y), and Tx at (0, 0). As seen from Tx, the position is opposite the interferer. `q` is
+    /// The interferer is at (X, Y), and Tx at (0, 0). The position is on the side of Tx opposite the interferer. `q` is
     /// X^2 + Y^2.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
@@ -311,7 +311,7 @@ impl Plane {
         bisected(0.0, t, HALVINGS, rises).0
     }
 
-    /// Returns the point on a circle about Rx with the first hop's largest SIR, with noise: (x, y), m.
+    /// Returns the point (x, y), m, on a circle about Rx with the first hop's largest SIR in noise.
     ///
     /// `s` is the radius of the circle, m.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
@@ -340,7 +340,7 @@ impl Plane {
         self.g / (squared(s) + self.h2)
     }
 
-    /// Returns the point on the circle of radius `s` about Rx with the first hop's largest SIR.
+    /// Returns the point on the circle of radius `s` about Rx at which the first hop's SIR is largest.
     fn loudest(&self, s: f64) -> (f64, f64) {
         if self.noise > 0.0 {
             return self.loudest_in_noise(s);

@@ -184,7 +184,7 @@ impl Edge {
     }
 }
 
-/// Returns the values in ascending order. A NaN is replaced by one of the other values.
+/// Returns the values in ascending order. A NaN is replaced by a value that is a number.
 fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, b) = (a.min(b), a.max(b));
     let (c, d) = (c.min(d), c.max(d));
@@ -195,7 +195,7 @@ fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Returns the two t, m, of the first hop's extrema on an edge, without noise.
+/// Returns the two t, m, of the first hop's extrema on an edge, if there is no noise.
 ///
 /// t is the coordinate that varies along the edge.
 fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
@@ -238,7 +238,7 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     [-mirrored.hill(-behind), low, high].map(|t| libm::copysign(1.0, p) * t)
 }
 
-/// Number of lines of constant y, on either side of y = 0, in the search at one altitude.
+/// Number of lines of constant y > 0 in the search at one altitude; there are as many with y < 0.
 const LINES: u8 = 24;
 
 /// Number of the best lines of constant y near which the search is refined.
@@ -328,8 +328,8 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
 
 /// Returns the position in the plane y = `y_m` at which the curves of constant SIR of both hops touch.
 ///
-/// `None` without noise, or if the position is not between Tx and Rx or not within the altitudes `band`. Work: 40
-/// bisection steps.
+/// `None` if there is no noise, or if the position is not between Tx and Rx or not within the altitudes `band`. Work:
+/// 40 bisection steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -377,7 +377,7 @@ struct Face {
 }
 
 impl Face {
-    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane.
+    /// Returns the point on a circle about Rx in this plane at which the first hop's SIR is largest.
     ///
     /// The result is its x minus the x of Rx, m. `r` is the radius of the circle, m.
     fn best(&self, r: f64) -> f64 {
@@ -388,7 +388,7 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// Returns the first hop's largest SIR on a circle about Rx in this plane, divided by the hop's gain.
+    /// Returns the first hop's largest SIR, divided by the hop's gain, on a circle about Rx in this plane.
     ///
     /// `r` is the radius of the circle, m.
     fn first(&self, r: f64) -> f64 {

@@ -40,7 +40,7 @@ impl Real for f64 {}
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// `holds` should be true at `low` and false at `high`. It changes between the returned ends.
+/// `holds` should return true for `low` and false for `high`. Its value changes between the returned ends.
 pub(super) fn bisected<T: Real>(
     low: T,
     high: T,
@@ -159,14 +159,14 @@ impl<T: Real> Slope<T> {
         half - T::from(2.0) * self.noise * s * (t - p) > T::from(0.0)
     }
 
-    /// Returns the only maximum of the SIR for p < 0, m. `peak` is its t without noise.
+    /// Returns the only maximum of the SIR for p < 0, m. `peak` is the t that it would have if there were no noise.
     pub(super) fn hill(&self, peak: T) -> T {
         bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
     }
 
     /// Returns the minimum and the maximum of the SIR for p > 0, m; `None` if the SIR only falls.
     ///
-    /// `bottom` is the minimum without noise.
+    /// `bottom` is the minimum for a noise of 0.
     pub(super) fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
         let bends_up = |t: T| self.bends_up(t);
         if !bends_up(bottom) {

@@ -68,9 +68,9 @@ impl TwoHops<'_> {
 
     /// Returns the position on a straight line at which both hops have the same SIR.
     ///
-    /// `is_low` returns true for a value of the varying coordinate below the searched one. The search is from `low` to
-    /// `high`, m. `place` returns the position for a value. Of the two adjacent f32 values, the one with the better SIR
-    /// is returned.
+    /// `is_low` returns true if a value of the varying coordinate is below the searched value. The search is from `low`
+    /// to `high`, m. `place` returns the position for a value. Of the two adjacent f32 values, the one with the better
+    /// SIR is returned.
     fn crossing(
         &self,
         low: f32,

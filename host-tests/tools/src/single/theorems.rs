@@ -104,16 +104,16 @@ pub enum PlaceCase {
     Crossing = 2,
     /// Optimum above Rx: the first hop's SIR falls all the way to Rx.
     ///
-    /// Above Rx it is still higher than the second hop's.
+    /// Above Rx the first hop's SIR is still higher than the second hop's.
     AboveRx = 3,
     /// Optimum at an x with the same SIR on both hops, before the minimum of the first hop's SIR.
     ///
-    /// The first hop's SIR rises again beyond its minimum. If the worse hop's SIR is then higher above Rx, the optimum
-    /// is above Rx instead.
+    /// The first hop's SIR rises again beyond its minimum. If the worse hop's SIR is higher above Rx than here, the
+    /// optimum is above Rx instead.
     BeforeValley = 4,
     /// Optimum above Rx: the first hop's SIR has a minimum before Rx.
     ///
-    /// At that minimum it is still higher than the second hop's.
+    /// At that minimum the first hop's SIR is still higher than the second hop's.
     OverValley = 5,
     /// Optimum at the maximum of the first hop's SIR, which is still lower there than the second hop's.
     ///
@@ -151,8 +151,8 @@ impl PlaceCase {
 
 /// Returns the optimal position of a relay with `profile` and y = 0, and its case; `None` in a field.
 ///
-/// It is between Tx and Rx. Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230
-/// more.
+/// The position is between Tx and Rx. Valid for any valid mission. Work: at most 90 evaluations of both hops, and with
+/// noise 230 more.
 pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
     let two = Two::new(mission, profile);
@@ -355,16 +355,16 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
 /// p_t and p_u are the powers of Tx and relay. The cases are those of the paper's Corollary 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Guide {
-    /// Ratio C_1: below it, the first hop is worse than the second even right above Tx.
+    /// Ratio C_1: below it, the first hop has a lower SIR than the second even vertically above Tx.
     ///
     /// C_1 is 0 if the interferer is at Rx.
     pub c1: f32,
-    /// Ratio C_2: above it, the first hop is better than the second even right above Rx.
+    /// Ratio C_2: above it, the first hop has a higher SIR than the second even vertically above Rx.
     pub c2: f32,
-    /// Ratio C_3: above it, the first hop is better than the second even at the minimum of its SIR.
+    /// Ratio C_3: above it, the first hop has a higher SIR than the second even where its SIR is minimal.
     ///
-    /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, for example with an interferer at X
-    /// <= 0. With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
+    /// This minimum is between Tx and Rx, or beyond Rx. `None` if there is no minimum, for example for an interferer at
+    /// X <= 0. With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
     pub c3: Option<f32>,
 }
 
@@ -395,9 +395,9 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
 
 /// Returns the altitudes at which both hops have the same SIR, m: the paper's h^- and h^+.
 ///
-/// The lower altitude is first. The relay has `power_w` watts and is at `x_m`; these two are not limited. Altitudes are
-/// above 0, and not limited to the mission's range. An altitude that does not exist is `None`; in an interference field
-/// both are `None`. Constant work.
+/// The lower altitude is first. The relay has `power_w` watts and is at `x_m`; neither is limited to the mission's
+/// ranges. Altitudes are above 0, and not limited to the mission's range. An altitude that does not exist is `None`; in
+/// an interference field both are `None`. Constant work.
 pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
     let Some(interferer) = mission.interferer() else {
         return [None; 2];

@@ -71,7 +71,7 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
 
 /// Returns the position from `low` to `high`, m, at which the worse hop has its largest SIR.
 ///
-/// The first hop's mean SIR must only rise or only fall there.
+/// From `low` to `high` the first hop's mean SIR must only rise or only fall.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {
@@ -81,10 +81,10 @@ fn best_of(two: &Two, low: f32, high: f32) -> Found {
     ends.or(two.crossing(low, high))
 }
 
-/// Returns the optimal position of a relay with `profile` between Tx and Rx; `None` without a field.
+/// Returns the optimal position of a relay with `profile`; `None` if the mission has no field.
 ///
-/// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops per field point; not for a relay's main
-/// loop.
+/// The relative difference from the best SIR is at most 1e-5. Work: at most 260 evaluations of both hops per field
+/// point; not for a relay's main loop.
 pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     let field = mission.heard()?;
     let two = Two::new(mission, profile);
@@ -138,9 +138,9 @@ fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> 
 
 /// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon`.
 ///
-/// `epsilon` is linear, above 0. `None` without a field. The algorithm evaluates only positions at which the second
-/// hop's mean SIR equals a target. It can miss the optimum of a field that changes much between two such positions.
-/// Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// `epsilon` is linear, above 0. `None` if the mission has no field. The algorithm evaluates only positions at which
+/// the second hop's mean SIR equals a target. It can miss the optimum of a field that changes a lot between two such
+/// positions. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two::new(mission, profile);

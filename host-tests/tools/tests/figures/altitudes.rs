@@ -176,7 +176,7 @@ fn link_of_one(y_i: f64) -> Link {
 
 /// Returns the best SIR of one relay from the recorded optima, linear.
 ///
-/// The interferer is at y = `y_i`, m. The relay may have y up to `room_m` on either side, and altitudes up to `most_m`.
+/// The interferer is at y = `y_i`, m. The relay may have |y| up to `room_m`, and altitudes up to `most_m`.
 fn judged(y_i: f64, room_m: f64, most_m: f64) -> f64 {
     let corridor = Corridor {
         least_m: ALTITUDES_M.0,

@@ -82,7 +82,7 @@ fn the_fewest_relays_agree_with_the_reference() {
     }
 }
 
-/// Checks that an interferer nearer to the line needs more relays, and that more power needs fewer.
+/// Checks that more relays are needed with a nearer interferer, and fewer with more relay power.
 ///
 /// The page of the figures says so.
 #[test]

@@ -36,7 +36,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value}"))
 }
 
-/// Returns the linear SIRs of all hops in a report: in the direction to Rx, and in the direction to Tx.
+/// Returns the linear SIRs of all hops in a report: for data toward Rx, and for data toward Tx.
 fn sirs(report: &Value) -> [Vec<f64>; 2] {
     [("sir", "rx_sir"), ("sir_back", "rx_sir_back")].map(|(of, of_rx)| {
         let relays = report["relays"].as_array().unwrap().iter();
@@ -201,7 +201,7 @@ fn what_has_no_way_back_is_refused_by_name() {
     assert!(line.contains("link.reverse"), "{line}");
 }
 
-/// Checks plans for both directions, with several interferers and with a field of interference.
+/// Checks plans for data in both directions, with several interferers and with an interference field.
 #[test]
 fn several_interferers_and_fields_are_planned_both_ways() {
     let several = scenario(

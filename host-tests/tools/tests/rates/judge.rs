@@ -19,7 +19,7 @@ pub(crate) struct Chain {
     pub(crate) distance_m: f64,
     /// Common altitude of the relays, m.
     pub(crate) altitude_m: f64,
-    /// Least distance between neighbouring relays along x, m.
+    /// Minimum distance between neighbouring relays along x, m.
     pub(crate) apart_m: f64,
     /// Transmit powers of Tx, of the relays in order, and of Rx, W.
     pub(crate) powers_w: Vec<f64>,
@@ -129,7 +129,8 @@ impl Chain {
 
     /// Returns the data rate of a chain with relays at `x`, m, in bit/s/Hz.
     ///
-    /// For both directions it is the smaller of two rates: to Rx, and to Tx divided by `reverse`.
+    /// For data in both directions it is the smaller of two values: the rate to Rx, and the rate to Tx divided by
+    /// `reverse`.
     pub(crate) fn rate(&self, x: &[f64]) -> f64 {
         self.rate_of(self.total(x), x.len())
     }
@@ -142,7 +143,7 @@ impl Chain {
         }
     }
 
-    /// Returns the chain with only the first `relays` relays.
+    /// Returns a copy of the chain with only the first `relays` relays.
     pub(crate) fn with(&self, relays: usize) -> Self {
         let mut powers_w = self.powers_w[..=relays].to_vec();
         powers_w.extend(self.powers_w.last());
@@ -215,9 +216,9 @@ impl Chain {
     /// Returns the x of the relays with the largest rate for a radio with rate steps, m.
     ///
     /// There is a list of x for each number of relays from 1. The search extends chains from Tx relay by relay. Each
-    /// cell of a grid keeps the few unfinished chains with the least times that end there; of equal times, the chain
-    /// that ends farther from Tx. The next relay is tried at all grid points, and at all x at which the time of the hop
-    /// changes.
+    /// cell of a grid keeps the few unfinished chains with the least times that end there; if times are equal, it keeps
+    /// the chain that ends farther from Tx. The next relay is tried at all grid points, and at all x at which the time
+    /// of the hop changes.
     fn by_changes(&self) -> Vec<Vec<f64>> {
         let mut grid = self.grid();
         grid.extend((0..=CELLS).map(|i| self.distance_m * i as f64 / CELLS as f64));
@@ -299,7 +300,7 @@ impl Chain {
         all
     }
 
-    /// Improves the x of the relays, from `start` on, by golden-section search.
+    /// Improves the x `start` of the relays by golden-section search.
     ///
     /// It moves groups of one to four neighbouring relays together.
     fn improved(&self, start: &[f64]) -> Vec<f64> {
@@ -343,7 +344,7 @@ impl Chain {
 
     /// Returns the largest data rates of all relays that two searches find, bit/s/Hz.
     ///
-    /// The first search starts from its own grid. The second also starts from the x `others`, m.
+    /// The first search starts from its own grid. The second search also starts from the x in `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {
         let grid = self.searched();
         let starts = [grid.last().unwrap().as_slice(), others];

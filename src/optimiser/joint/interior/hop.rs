@@ -25,10 +25,10 @@ use super::super::hop::{Triple, minus};
 /// to Rx.
 const SHORTEST: f32 = 1e-8;
 
-/// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).
+/// Levels of a hop: ln(SIR toward Rx) and ln(SIR toward Tx / r).
 ///
-/// The factor r is the required ratio of backward to forward SIR. Other pairs of values for a hop have the same
-/// order: forward, backward. The *slack* of a level is the level minus the target.
+/// r is the required ratio of the SIR toward Tx to the SIR toward Rx. All pairs of values for a hop have the order
+/// toward Rx, toward Tx. The *slack* of a level is the level minus the target.
 pub(super) type Levels = [f32; 2];
 
 /// Symmetric 3 x 3 matrix with rows and columns x, y and altitude h. The elements are xx, xy, xh, yy, yh, hh.
@@ -91,8 +91,8 @@ impl LogGains {
         }
     }
 
-    /// Returns the logarithms of both gains of hop `k`; the backward gain is divided by r. `k` is 1 (from Tx) to N + 1
-    /// (to Rx).
+    /// Returns the logarithms of hop `k`'s gains toward Rx and toward Tx; the latter gain is divided by r. `k` is 1
+    /// (from Tx) to N + 1 (to Rx).
     fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;
@@ -105,8 +105,8 @@ impl LogGains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. The interference is divided by
-    /// the interferer's power received at the distance D from Tx to Rx.
+    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. The unit of interference and
+    /// noise is the interferer's power received at the distance D from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;
@@ -131,7 +131,7 @@ impl LogGains {
     }
 
     /// Returns the derivatives of hop `k`'s [levels](Levels) by the positions of its ends `from` and `to`. The second
-    /// derivatives of both levels are added up with the `weights`. If `convex` is true, terms that would make this sum
+    /// derivatives of the two levels are summed with the `weights`. If `convex` is true, terms that would make this sum
     /// indefinite are left out.
     pub(super) fn derivatives(
         &self,
@@ -208,7 +208,7 @@ pub(super) struct Derivatives {
     pub(super) by_to: [Triple; 2],
     pub(super) bend_from: Symmetric,
     pub(super) bend_to: Symmetric,
-    /// Part of `bend_from` and `bend_to` that comes from the hop's length. The mixed second derivatives, with respect
-    /// to one end and the other, are the negative of this matrix.
+    /// Part of `bend_from` and `bend_to` that comes from the hop's length. The mixed second derivatives, by `from` and
+    /// `to`, are the negative of this matrix.
     pub(super) bend: Symmetric,
 }

@@ -48,21 +48,21 @@ const CLOSE_MU: f32 = 3e-3;
 /// concave around the optimum.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight falls once a Newton step gains little.
+/// Factor on the barrier weight, applied once a Newton step raises the merit only a little.
 const LESS: f32 = 0.3;
 
-/// Gain below which the positions are near enough to the optimum after more than half of a Newton step. The gain is the
-/// increase of the merit (the maximised function) divided by the barrier weight.
+/// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. This limit applies
+/// after more than half of a Newton step. The merit is the maximised function.
 const SETTLED: f32 = 0.1;
-/// Gain below which the positions are near enough to the optimum after a Newton step of any length. The gain is the
-/// increase of the merit (the maximised function) divided by the barrier weight.
+/// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. This limit applies
+/// after a Newton step of any length. The merit is the maximised function.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
+/// Maximum step of a coordinate toward its limit, as a fraction of the distance to that limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a Newton step is shortened if it lowers the merit (the maximised function).
+/// Factor on the length of a Newton step that lowers the merit (the maximised function).
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
@@ -73,18 +73,18 @@ const APART: f32 = 5.0;
 const STEPS: u8 = 4;
 /// Index, from 0, of the last Newton step for the target.
 const TARGETS: u8 = 12;
-/// Relative error at which the Newton steps for the target end.
+/// Relative error at which the Newton iteration for the target T ends.
 const EXACT: f32 = 5e-4;
 
 /// Number of relays in a segment, the part of the chain that one call handles.
 const AT_ONCE: u16 = 10;
-/// Number of relays in the first of a segment's two parts; the other part has the rest.
+/// Number of relays in the first of a segment's two parts.
 const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers. Each multiplier is stored as the upper half of an
-/// f32.
+/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers. Each multiplier is stored as the upper 16 bits of
+/// an f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: Levels,
@@ -112,7 +112,7 @@ impl Noted for Node {
     }
 }
 
-/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32: three digits.
+/// Newton step of a relay in x, y and h. Each value is stored as the upper 16 bits of an f32 (three decimal digits).
 type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
@@ -150,8 +150,8 @@ impl Spot {
         minus(self.high, self.at)
     }
 
-    /// Moves each coordinate at least `margin` inside its limits. `margin` is a fraction of the distance between the
-    /// limits.
+    /// Moves each coordinate so that it is at least `margin` inside its limits. `margin` is a fraction of the distance
+    /// between the limits.
     fn enclose(&mut self, margin: f32) {
         let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
@@ -165,7 +165,7 @@ impl Spot {
 enum Work {
     /// Computation of all hops' [levels](Levels) at the tried positions. The field is the next hop.
     Levels(u16),
-    /// Computation of the target from all levels; the field is the number of Newton steps done.
+    /// Computation of the target from all levels; the field is the number of Newton steps done for it.
     Target(u8),
     /// Summation of the merit, which decides if a step is accepted. The field is the next hop.
     Merit(u16),
@@ -178,21 +178,21 @@ enum Work {
     Substitute(u16, bool),
 }
 
-/// Interior-point method for the worst SIR of both directions: all positions and the Newton step.
+/// Interior-point method for the worst SIR of all hops toward Rx and Tx: positions and Newton step.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Parts of the line Tx-Rx in which one relay must not be, as fractions of the distance from Tx to Rx. Relay 1 must
-    /// not be in the part next to Rx, the last relay not in the part next to Tx.
+    /// Minimum distances along x: of relay 1 from Rx, and of the last relay from Tx. The unit is the distance from Tx
+    /// to Rx.
     pub(super) closed: [f32; 2],
     pub(super) nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
     /// Newton steps of the current segment's second part, kept until its first part is computed.
     second: [Step; SECOND],
-    /// Newton step of the next relay toward Rx, from which the current relay's step follows.
+    /// Newton step of the next relay toward Rx. The current relay's step is computed from it.
     ahead: Triple,
     work: Work,
     mu: f32,
@@ -202,7 +202,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     merit: f32,
     /// Sum of the barrier's logarithms at the tried positions, for the hops handled so far.
     sum: f32,
-    /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions only.
+    /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions.
     share: f32,
     sums: Sums,
     by_target: f32,
@@ -251,7 +251,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.look(true);
     }
 
-    /// Sets relay `index` to `place`, but at least `margin` inside the limits of its coordinates. `margin` is a
+    /// Sets relay `index` to `place`, moved at least `margin` inside the limits of its coordinates. `margin` is a
     /// fraction of the distance between the limits.
     pub(super) fn put(
         &mut self,
@@ -338,7 +338,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the stored levels and Lagrange multipliers of hop `k`. It leads to relay `k`, or to Rx if `k` is N + 1.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`. Hop `k` leads to relay `k`, or to Rx if `k` is N
+    /// + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -347,8 +348,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Prepares the evaluation of the stored positions, without a step. If `resets` is true, the evaluation replaces
-    /// the Lagrange multipliers.
+    /// Prepares the evaluation of the stored positions, without a step. If `resets` is true, the evaluation sets the
+    /// Lagrange multipliers to their values at the optimum.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -361,8 +362,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues the interior-point method by one bounded portion. `Ready` at the end, with a target in ln(SIR)
-    /// slightly below all [levels](Levels) of the hops at the stored positions.
+    /// Continues the interior-point method by one bounded portion. `Ready` at the end, with a target in ln(SIR). The
+    /// target is slightly below all [levels](Levels) of the hops at the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -410,8 +411,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the [levels](Levels) of ten hops, from hop `k` on. Adds ln(distance to a limit) to the barrier for the
-    /// coordinates of the hops' ends.
+    /// Computes the [levels](Levels) of ten hops from hop `k`, and adds the hops' receivers to the barrier. The barrier
+    /// is the sum of ln(distance of a coordinate to its limit).
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -444,8 +445,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Computes the target T for the stored levels c, in ln(SIR). The sum of mu / (c - T) over all levels is 1.
     ///
-    /// The inverse of this sum is concave in T, and Newton's method starts above the solution. So T falls to the
-    /// solution.
+    /// The inverse of this sum is concave in T, and Newton's method starts above the solution. So every iteration
+    /// lowers T toward the solution.
     fn approach(&mut self, relays: u16, steps: u8) {
         let end = steps + STEPS;
         self.work = Work::Target(end);
@@ -478,8 +479,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts the tried step if it does not lower the merit; otherwise shortens the step. After the last attempt the
-    /// step is computed again without negative curvature. If that fails too, the barrier weight falls.
+    /// Accepts the tried step if it does not lower the merit; otherwise shortens the step. If the shortest step also
+    /// lowers the merit, a new step is computed without negative curvature. If that one fails too, the barrier weight
+    /// falls.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -505,8 +507,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k`. Limits the Lagrange multipliers of the hop to relay `k` to the factor
-    /// [`APART`] of their values at the optimum.
+    /// Stores the new position of relay `k`. Limits the Lagrange multipliers of the hop to relay `k`: they differ from
+    /// their values at the optimum by at most the factor [`APART`].
     fn accept(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         if self.share > 0.0 && k <= relays {
@@ -676,8 +678,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Lowers the common factor on all Newton steps, so that the relay at `spot` stays within its limits. `step` is
-    /// that relay's step without this factor.
+    /// Lowers the tried fraction of all Newton steps, so that the relay at `spot` stays within its limits. `step` is
+    /// that relay's whole Newton step.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let (below, above) = (spot.room_below(), spot.room_above());
         for (step, (below, above)) in step.iter().zip(below.iter().zip(&above)) {

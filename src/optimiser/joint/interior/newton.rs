@@ -26,7 +26,7 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest pivot that counts as positive, divided by the diagonal element before the elimination.
+/// Smallest positive pivot, divided by the value of that diagonal element before the elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
 /// Curvature of a coordinate whose two limits are equal. The curvature is so large that the Newton step does not move
@@ -45,8 +45,8 @@ pub(super) struct Front {
 }
 
 /// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the next
-/// relay's steps in x, y and h. The last two are the right side: its constant part, and its part per unit of the
-/// target's change.
+/// relay's steps in x, y and h. The last two are the right-hand side: a constant, and a coefficient of the target's
+/// change.
 type Row = [f32; 5];
 
 /// Equations of an eliminated relay, for the computation of its Newton step.
@@ -76,19 +76,19 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier divided by the slack for each direction of the hop.
+    /// Returns the Lagrange multiplier divided by the slack, for each direction of data on the hop.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is the barrier weight
-    /// mu divided by the slack.
+    /// Returns the Lagrange multipliers at the optimum: mu / slack for each direction of data on the hop. mu is the
+    /// barrier weight.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the hop's Lagrange multipliers after a Newton step that changes its slacks by a and b.
+    /// Returns the hop's Lagrange multipliers after a Newton step that changes the two slacks by a and b.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -106,8 +106,8 @@ impl Front {
     /// Eliminates the relay before `hop` from the Newton system. On entry `self` has the rows of this relay, on return
     /// the rows of the node at `spot`, where `hop` ends.
     ///
-    /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
-    /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
+    /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive. If
+    /// `convex` is true, a pivot can only be too small by rounding, and is raised instead.
     pub(super) fn pass(
         &mut self,
         is_relay: bool,
@@ -191,7 +191,7 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations. Adds it to `sums`.
+    /// Subtracts the terms of the eliminated previous relay, `factor`, from these equations. Adds the terms to `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -224,7 +224,8 @@ impl Front {
 }
 
 /// Adds the derivatives of one coordinate's barrier, mu (ln a + ln b), to `slope` and `bend`. The second derivative is
-/// negated before. a and b are the distances to the lower and the upper limit, and mu is the barrier weight.
+/// added with the opposite sign. a and b are the distances to the lower and the upper limit, and mu is the barrier
+/// weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
@@ -269,8 +270,7 @@ impl Factor {
         rows: [[0.0; 5]; 3],
     };
 
-    /// Returns this relay's Newton step. It follows from the target's step `by_target` and the next relay's step
-    /// `next`.
+    /// Returns this relay's Newton step. `by_target` is the target's step, and `next` the next relay's step.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
         let known = (self.rows)
             .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));

@@ -27,15 +27,15 @@ use core::task::Poll;
 /// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
-/// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays at
-/// the same x. The first value is for the first run of this method, the second for repetitions.
+/// Fraction by which relays move toward even spacing before the interior-point method starts. The move separates relays
+/// that have the same x. The first value is for the first run of this method, the second for repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
-/// Description of an initial chain, from the end with more power (Tx or Rx) to the other end.
+/// Description of an initial chain. The first relay is the one next to the end (Tx or Rx) with more power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offsets of the first, the middle and the last relay, away from the interferer. They are fractions of the
-    /// largest permitted offset.
+    /// Lateral offsets of the first, the middle and the last relay, on the side opposite the interferer. They are
+    /// fractions of the largest permitted offset.
     aside: [f32; 3],
     /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
     up: [f32; 2],
@@ -45,13 +45,13 @@ struct Start {
 /// Way to choose the initial x of the relays along the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Along {
-    /// x from Algorithm 1, for the relays' lateral offsets and altitudes.
+    /// Use of Algorithm 1 for the x, with the relays' lateral offsets and altitudes.
     Line,
-    /// First and last x of evenly spaced relays, counted from the end with more power. They are fractions of the
-    /// distance from Tx to Rx.
+    /// Spacing in equal steps, from the first to the last relay. The fields are the distances of these two relays from
+    /// the end (Tx or Rx) with more power. They are fractions of the distance from Tx to Rx.
     Even([f32; 2]),
-    /// x from Algorithm 1, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow part of an
-    /// ellipse down to the end with less power.
+    /// Use of Algorithm 1 for the x, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow
+    /// part of an ellipse down to the end (Tx or Rx) with less power.
     Arc,
 }
 
@@ -218,9 +218,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Begin(0)
     }
 
-    /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. The first `done`
-    /// relays have theirs already. After the last initial chain, the next work is the final search for the best chain's
-    /// target.
+    /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. It skips the first
+    /// `done` relays, for which they are chosen already. After the last initial chain, the next work is the final
+    /// search for the best chain's target.
     fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -255,8 +255,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. There the SIR of
-    /// this relay rises with its distance from that end.
+    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. At these x the
+    /// SIR of this relay rises with its distance from that end.
     ///
     /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
     /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
@@ -281,7 +281,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
-    /// altitude, uses only `along` of chain 1: its x come from Algorithm 1.
+    /// altitude, gets the description of chain 1, but only `along` of it is used.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
@@ -308,9 +308,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Chooses the positions at which the interior-point method starts, and starts it. The first `done` relays have
-    /// theirs already. Lateral offsets and altitudes are the stored values. The x come from Algorithm 1, or are evenly
-    /// spaced.
+    /// Chooses the positions at which the interior-point method starts, and starts the method. It skips the first
+    /// `done` relays, for which positions are chosen already. Lateral offsets and altitudes are the stored values. The
+    /// x come from Algorithm 1, or are evenly spaced.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.relays();
@@ -359,15 +359,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if the initial chains are described from Rx. This is so if Rx has more power than Tx. With equal powers
-/// it is so if less SIR is required backward, because Rx on the ground receives less interference than relay 1.
+/// Returns true if the initial chains are described from Rx, false if from Tx. The result is true if Rx has more power
+/// than Tx. With equal powers it is true if less SIR is required toward Tx than toward Rx.
 fn is_turned(chain: &Chain<'_, impl SeatOf>) -> bool {
     let config = chain.mission.config();
     let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
     rx_w > tx_w || (rx_w >= tx_w && config.reverse < 1.0)
 }
 
-/// Returns the number of other relays between relay `index` and the end with more power (Tx or Rx).
+/// Returns the number of relays between relay `index` and the end (Tx or Rx) with more power.
 fn before(chain: &Chain<'_, impl SeatOf>, index: u16) -> u16 {
     if is_turned(chain) {
         chain.relays() - index
@@ -384,11 +384,11 @@ fn quarter(part: u16, whole: u16) -> [f32; 2] {
 }
 
 /// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1 meets
-/// at the last run's lateral offsets and altitudes, minus the target of that run.
+/// after the last run, minus the target of that run.
 const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// Difference in ln(SIR) of the first target to try and the result of the interior-point method. It is the possible
-/// error of this method.
+/// First target to try, minus the target of the interior-point method, in ln(SIR). The difference allows for the error
+/// of this method.
 const ABOVE: f32 = 1e-4;

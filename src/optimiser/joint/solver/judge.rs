@@ -16,11 +16,11 @@ use core::task::Poll;
 /// Precision in ln(SIR) of the search for the highest target that an improved chain meets.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). If a chain reaches
-/// the bound within this tolerance, the search for better chains ends.
+/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). The search for
+/// better chains ends if a chain reaches the bound within this tolerance.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.
+/// Difference in ln(SIR) of the first limit on the target and the upper bound of all chains.
 ///
 /// The search then checks if the chain reaches the bound; if so, the search ends.
 const PROBED: f32 = 3e-4;
@@ -47,8 +47,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Records if the chain meets the tried target, and selects the next piece of work.
     ///
-    /// `met` is `None` if the target is infeasible; otherwise it is true if some relays have to stay short of their
-    /// farthest positions.
+    /// `met` is `None` if the target is infeasible; otherwise it is true if some relays have to stay closer to Tx than
+    /// their farthest x.
     pub(super) fn tried(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -155,12 +155,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target of the current chain, after an ascent. An ascent is an
-    /// improvement in steps.
+    /// Returns the work that searches for the highest target of the current chain, after its improvement.
     ///
-    /// Hops are computed exactly as the relays compute them from their messages. Relays are allowed to stay short of
-    /// their farthest position. The ascent ended at the target `sigma`, and `ceiling` is the upper bound of all chains,
-    /// both in ln(SIR).
+    /// Hops are computed exactly as the relays compute them from their messages. Relays are allowed to stay closer to
+    /// Tx than their farthest x. The improvement ended at the target `sigma`, and `ceiling` is the upper bound of all
+    /// chains, both in ln(SIR).
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -177,7 +176,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current chain can no longer become the best chain, and its improvement stops. `turn` is the
+    /// Returns true if the current chain can no longer become the best chain. Its improvement then stops. `turn` is the
     /// next action of the improvement.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
@@ -213,8 +212,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays for which single relays are moved in the last phase. If some relays have a fixed altitude,
-/// they are always moved, because the chain's path then has kinks.
+/// Maximum number of relays for which single relays are moved in the last phase. In a chain with fixed altitudes of
+/// some relays there is no maximum: single relays are always moved.
 const POLISHED: u16 = 5;
 
 /// Number of times that the trial moves of single relays are halved in the last phase.
@@ -229,8 +228,8 @@ const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Returns the current trial move: the relay's index, the kind of move, and the number of halvings. Kinds 0 to 3
-    /// move the relay down, up, left or right. Kinds 4 and 5 copy the lateral offset and altitude of the relay two
-    /// places toward Rx or toward Tx.
+    /// move the relay down, up, or to the sides. Kinds 4 and 5 copy the lateral offset and altitude of relay i + 2 or
+    /// relay i - 2 to relay i.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -240,9 +239,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Tries the next move of one relay in a chain that meets the target `sigma`, in ln(SIR).
     ///
-    /// The relay moves by a fraction of its allowed range, which is halved from round to round. Or it takes another
-    /// relay's lateral offset and altitude. These moves find gains that the derivatives do not show, because another
-    /// constraint is active.
+    /// The relay moves by a fraction of its allowed range, which is halved from round to round. Or it takes the lateral
+    /// offset and altitude of a different relay. These moves find improvements that the derivatives do not show.
     pub(super) fn polish(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -354,8 +352,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they come from a new initial
-    /// chain, otherwise from the stored chain.
+    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they belong to a new initial
+    /// chain, otherwise to the stored chain.
     pub(super) fn shaped(
         &self,
         chain: &Chain<'_, impl SeatOf>,

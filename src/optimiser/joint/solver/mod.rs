@@ -80,20 +80,20 @@ enum Purpose {
     Raise,
     /// Computation of the chain's slack after the upper limit on the slack was lowered.
     Tighten,
-    /// Search for the highest target of an improved chain, with the margins of the improvement.
+    /// Search for the highest target of an improved chain, with the hops computed as in the improvement.
     Judge,
-    /// Search for the highest target of an improved chain, with the hops exactly as in flight.
+    /// Search for the highest target of an improved chain, with the hops computed exactly as in flight.
     Last,
-    /// Check if the chain meets the upper bound of all chains, with the hops exactly as in flight.
+    /// Check if the chain meets the upper bound of all chains, with the hops computed exactly as in flight.
     Probe,
-    /// Check of a trial move of one relay, with the hops exactly as in flight.
+    /// Check of a trial move of one relay, with the hops computed exactly as in flight.
     Move,
 }
 
 impl Purpose {
     /// Returns true if hops are computed exactly as the relays compute them in flight, from messages.
     ///
-    /// A relay is then allowed to stay short of its farthest position.
+    /// A relay is then allowed to stay closer to Tx than its farthest x.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -121,15 +121,15 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     judged_at: Option<f32>,
     /// True if the current chain's improvement has not been stopped early.
     is_whole: bool,
-    /// True in the last phase, which searches the best chain's target more finely and moves single relays.
+    /// True in the last phase: finer search of the best chain's target, and trial moves of single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
     line: Line,
-    /// x of each relay and its upper limit, m, during a search with the hops exactly as in flight.
+    /// x of each relay, and the upper limit of this x, m. Used only while hops are computed exactly as in flight.
     notes: [[f32; 2]; RELAYS],
-    /// True if some relays have to stay short of their farthest position to meet the target found.
+    /// True if some relays have to stay closer to Tx than their farthest x to meet the target found.
     holds_back: bool,
     /// True if the minimum separation of relays has restricted the improvement of any chain.
     walled: bool,
@@ -198,8 +198,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::NONE;
     }
 
-    /// Stores the lateral offset and altitude `cell` of relay `index`. For the first relay of a segment it also stores
-    /// `x_m`, the x of the previous relay, m.
+    /// Stores the lateral offset and altitude `cell` of relay `index`. If the relay is the first of a segment, the
+    /// function also stores `x_m`, the x of relay `index` - 1, m.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -217,14 +217,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of solvers for both directions: 1 with the features `altitude` and `reverse`, else 0.
+/// Number of solvers for data in both directions: 1 with the features `altitude` and `reverse`, else 0.
 const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
 /// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is as long as its hop
 /// needs.
 const FITTED: usize = ALTITUDE as usize;
 
-/// Joint solver of a chain: the solver for one direction, for both directions, or for fitted slots.
+/// Joint solver of a chain: the solver for data in one direction, in both, or for fitted slots.
 ///
 /// A mission needs only one of the three, so they share their memory.
 #[cfg_attr(
@@ -280,23 +280,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the lateral offset and altitude of relay `index`, once the chain is solved. `seat` is that relay's
+    /// Returns the lateral offset and altitude of relay `index`. The chain must be solved. `seat` is that relay's
     /// profile.
     pub fn at(&self, index: u16, seat: Seat) -> CrossSection {
         let cell = self.cells().map(|cells| cells.get(index));
         cell.unwrap_or_default().place(seat.room)
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
+    /// Returns the largest x of relay `index`, m, at which the relays toward Rx fit with their separation.
     ///
-    /// Call it once the chain is solved. The limit is equal, to the bit, to the limit that the solver used.
+    /// The chain must be solved. The limit is equal, to the bit, to the limit that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let chain = Chain::new(mission, seat_of);
         let solved = chain.zip(self.cells());
         solved.map_or(0.0, |(chain, cells)| cells.end_m(&chain, index))
     }
 
-    /// Returns true if some relays have to stay short of their farthest x to meet the target found.
+    /// Returns true if, for the target found, some relays have to stay closer to Tx than their farthest x.
     pub const fn holds_back(&self) -> bool {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,
@@ -305,11 +305,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Continues to solve the chain by one bounded step. For one direction a step handles ten relays of a pass that
-    /// moves them, or twenty of another pass. For both directions it handles at least two relays.
+    /// Continues to solve the chain by one bounded step. With data in one direction, a step handles ten relays of a
+    /// pass that moves them, or twenty relays of any other pass. With data in both directions it handles at least two
+    /// relays.
     ///
-    /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
-    /// must always return the same.
+    /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, which
+    /// must not change between calls.
     ///
     /// # Errors
     /// [`Infeasible`] if no target can be met.
@@ -329,8 +330,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solved.unwrap_or(Poll::Ready(Err(Infeasible)))
     }
 
-    /// Returns the position of relay `index` and its slots, once the chain is solved. `None` unless the mission has
-    /// fitted slots.
+    /// Returns the position of relay `index` and its time slots. The chain must be solved. `None` unless the mission
+    /// has fitted slots: time slots as long as each hop needs.
     pub fn fitted(
         &self,
         mission: &Mission,
@@ -418,8 +419,8 @@ mod tests {
     }
 
     /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is the
-    /// target, the others are each relay's lateral offset and altitude. If `once_more` is true, the best chain is
-    /// computed again instead of stored.
+    /// target; then follow each relay's lateral offset and altitude. If `once_more` is true, the best chain is computed
+    /// again instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],

@@ -21,8 +21,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Computes the policies (moves) of the relays in `segment`. Returns the value function of the relay before the
-    /// segment, which is at `before`.
+    /// Computes the policies (moves) of the relays in `segment`. Returns the value function of the last relay before
+    /// the segment; `before` is the position of that relay.
     ///
     /// `None` if a hop cannot meet the target. Bounded by ten relays.
     pub(super) fn recall(
@@ -91,7 +91,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the position of the relay before `segment` in the current chain.
+    /// Returns the position of the last relay before `segment` in the current chain.
     pub(super) fn nominal_before(&self, chain: &Chain<'_, impl SeatOf>, segment: u8) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
@@ -105,8 +105,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Continues the forward pass by one segment, or first computes the moves of its relays. The pass tries the
-    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept` is true.
+    /// Continues the forward pass by one segment. If the moves of its relays are not in memory, computes them instead.
+    /// The pass tries the fraction `share` of the moves with the target `sigma`, in ln(SIR). The chain is stored if
+    /// `kept` is true.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,

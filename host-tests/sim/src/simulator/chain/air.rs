@@ -61,7 +61,8 @@ impl Chain {
 
     /// Queues the arrivals of a frame at its receivers and returns a description of its faults.
     ///
-    /// The frame was sent by node `from`, and arrives at port `into`, at the time `arrives` unless a fault delays it.
+    /// The frame was sent by node `from`, and arrives at port `into`. It arrives at the time `arrives` unless a fault
+    /// delays it.
     pub(super) fn send(
         &mut self,
         from: usize,
@@ -278,7 +279,7 @@ pub(super) fn link(index: usize, port: Port) -> Link {
 const NEIGHBOUR: usize = 4;
 
 impl Chain {
-    /// Returns the number of relays on each side that receive a relay's frames: 1 on separate links.
+    /// Returns the number of relays toward Tx, and toward Rx, that receive a relay's frames.
     pub(super) fn reach(&self) -> usize {
         match self.setup.settings.wiring {
             Wiring::Pair => 1,
@@ -294,7 +295,7 @@ impl Chain {
             .any(|part| part.parts(number(one), number(other), self.now))
     }
 
-    /// Returns true if no failure prevents relay `by` from receiving relay `of` (both from 0) at present.
+    /// Returns true if no failure prevents relay `by` from receiving relay `of` now; both count from 0.
     ///
     /// A failure is a partition or a one-way link failure. The radio range is not checked.
     pub(super) fn hears(&self, by: usize, of: usize) -> bool {

@@ -20,10 +20,10 @@ const LOOKS: Duration = Duration::from_millis(5_000);
 
 /// Distance to keep from moving drones during a hand-over, m, in addition to the required separation.
 ///
-/// A pilot does not hand a drone over to its relay while another moving drone is nearer.
+/// A pilot does not hand a drone over to its relay while a moving drone is nearer to it.
 const TRAFFIC_M: f64 = 30.0;
 
-/// Time until a pilot lands a drone: since its relay was switched off, or since a permanent takeover.
+/// Time until a pilot lands a drone, after its relay was switched off or after a permanent takeover.
 ///
 /// The operator also waits for this time before confirming that lost drones have landed.
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
@@ -66,7 +66,7 @@ impl Chain {
         self.queue.put(self.now + STEP, 0, QueuedEvent::Fly);
     }
 
-    /// Updates `margin_m` of the outcome, the smallest distance of two drones minus the distance to keep.
+    /// Updates `margin_m` of the outcome: the smallest distance of two drones minus the required distance.
     ///
     /// It checks all pairs of flying drones that no pilot controls.
     fn measure_pairs(&mut self) {
@@ -96,7 +96,7 @@ impl Chain {
         }
     }
 
-    /// Updates the flag of each drone: true if its pilot sees traffic, another moving drone that is near.
+    /// Updates the flag `is_clear` of each drone: true if its pilot sees no moving drone near this drone.
     fn update_traffic(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let seen: Vec<(Point, bool)> = self
@@ -323,8 +323,8 @@ impl Chain {
 
     /// Returns true if each drone that is simulated without autopilot has reached its agreed position.
     ///
-    /// Drones of relays that are off do not count. The position is the drone's own estimate. True if there are no
-    /// such drones.
+    /// Drones of relays that are off do not count. The drone's own position estimate is used. True if there are no such
+    /// drones.
     pub(super) fn has_arrived(&self) -> bool {
         let Some(flight) = &self.flight else {
             return true;

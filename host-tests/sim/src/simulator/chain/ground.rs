@@ -84,7 +84,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Measures the interference at the ground stations at Tx and Rx. They send the results to the relays.
+    /// Measures the interference at the ground stations at Tx and Rx. The stations send the results to the relays.
     pub(super) fn measure_at_ends(&mut self, true_interference: &TrueInterference, scene: &Scene) {
         for at in 0..self.stations.len() {
             if let Some(station) = self.stations.get_mut(at) {
@@ -236,7 +236,7 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
 impl Chain {
     /// Returns the position of the drone of relay `index` (from 0), m; `None` if no drones are simulated.
     ///
-    /// It is the position that the drone estimates if the drone has no autopilot, otherwise the true position.
+    /// If the drone has no autopilot, it is the drone's own position estimate, otherwise the true position.
     pub(super) fn drone(&self, index: usize) -> Option<Point> {
         let flight = self.flight.as_ref();
         flight
@@ -353,7 +353,8 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// Sends one frame of the attacker to a living relay. Without a frame to replay, the attacker tries again later.
+    /// Sends one frame of the attacker to a living relay. If there is no frame to replay, the attacker tries again
+    /// later.
     pub(super) fn send_attack(&mut self, kind: AttackKind) {
         let now = self.now;
         let Some(mut attacker) = self.attacker.take() else {

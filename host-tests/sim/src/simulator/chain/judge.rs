@@ -36,7 +36,7 @@ impl ChangedRelays {
 impl Chain {
     /// Starts the statistics of the run.
     ///
-    /// `run` simulates a chain without faults, whose positions are the reference for the statistics.
+    /// `run` simulates a fault-free chain, whose positions are the reference for the statistics.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
@@ -103,7 +103,7 @@ impl Chain {
         }
     }
 
-    /// Returns true if the chain is available: it has the positions that it would reach without faults.
+    /// Returns true if the chain is available: at the positions that it would reach in a fault-free run.
     ///
     /// At least one of the longest chains that the living relays can form must be at its positions. If these chains are
     /// too small for a quorum, their relays have no positions, and the result is false.
@@ -247,7 +247,7 @@ impl Chain {
     }
 }
 
-/// Returns true if `part` has all relays of their view, in the order of their indices.
+/// Returns true if `part` contains all relays of one view, in the order of their indices.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
@@ -256,8 +256,8 @@ fn is_counted(part: &[&Member]) -> bool {
 
 /// Returns true if no part of the chain has enough relays for a quorum, and the relays have noticed it.
 ///
-/// For this each relay must know its present neighbours, and one relay of each part must have reported the missing
-/// quorum.
+/// They have noticed it once each relay knows its present neighbours, and one relay of each part has reported the
+/// missing quorum.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));
@@ -438,7 +438,8 @@ impl Chain {
         }
     }
 
-    /// Adds an entry about relay `index` (from 0) to the log of the run. `other` is the other node that it concerns.
+    /// Adds an entry about relay `index` (from 0) to the log of the run. `other` is the second node that the entry
+    /// concerns.
     pub(super) fn log(&mut self, index: usize, what: TimelineEvent, other: Option<u16>) {
         let Some(member) = self.members.get(index) else {
             return;

@@ -13,11 +13,11 @@ pub struct LiveRelay {
     pub report: Report,
     /// True while the relay is switched on.
     pub is_on: bool,
-    /// True while the relay is passive because another node has its number.
+    /// True while the relay is passive because a second node uses its number.
     pub is_passive: bool,
     /// Altitude and power of the relay.
     pub profile: Profile,
-    /// True if the relay has an interference estimate of its own, instead of the mission's interference.
+    /// True if the relay uses an estimate of the interference instead of the mission's interference.
     pub estimates: bool,
 }
 

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
-use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET, TARGET_V8M};
+use super::steps::{NIGHTLY, OLDEST, TARGET, TARGET_V8M};
 
 /// Debian packages that the steps need, each with a program of the same name.
 ///
@@ -77,10 +77,7 @@ const FOR_THE_REST: [Needed; 5] = [
     ),
 ];
 
-/// Version of cargo-fuzz to install.
-const CARGO_FUZZ_VERSION: &str = "0.13.2";
-
-/// Installs the missing tools, or only those that the quick steps need if `quick` is true.
+/// Installs the missing tools: the tools of the quick steps if `quick` is true, otherwise all tools.
 ///
 /// # Errors
 /// The command to type for a tool that cannot be installed.
@@ -90,36 +87,7 @@ pub(crate) fn prepare(quick: bool) -> Result<(), String> {
         return Ok(());
     }
     add(&FOR_THE_REST)?;
-    prepare_fuzzer()?;
     OF_DEBIAN.into_iter().try_for_each(prepare_program)
-}
-
-/// Installs cargo-fuzz in the target folder, for this project only, if cargo-fuzz is missing there.
-fn prepare_fuzzer() -> Result<(), String> {
-    if succeeds(CARGO_FUZZ, &["fuzz", "--version"]) {
-        return Ok(());
-    }
-    let install = [
-        "install",
-        "cargo-fuzz",
-        "--version",
-        CARGO_FUZZ_VERSION,
-        // The program only starts cargo and the targets: it need not be optimised.
-        "--debug",
-        "--locked",
-        "--root",
-        "target/tools",
-    ];
-    println!("ci: adding cargo-fuzz: cargo {}", install.join(" "));
-    let added = Command::new("cargo").args(install).status();
-    if added.is_ok_and(|status| status.success()) {
-        Ok(())
-    } else {
-        Err(format!(
-            "cargo-fuzz is missing and cannot be added; type: cargo {}",
-            install.join(" ")
-        ))
-    }
 }
 
 fn add(needed: &[Needed]) -> Result<(), String> {

@@ -77,8 +77,13 @@ pub(crate) enum Lane {
 /// The date of the compiler is fixed, so that a commit always has the same result.
 pub(crate) const NIGHTLY: &str = "nightly-2026-10-30";
 
-/// Path of cargo-fuzz, which [`super::prepare`] installs.
-pub(crate) const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
+/// Command that installs cargo-fuzz in the target folder, unless it is there. Only this project uses that copy.
+///
+/// The program only starts cargo and the fuzz targets, so that it is not optimised.
+const ADD_CARGO_FUZZ: &str = "cargo install cargo-fuzz --version 0.13.2 --locked --debug --root target/tools --target-dir target/tools/build";
+
+/// Path of the program that [`ADD_CARGO_FUZZ`] installs.
+const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
 
 /// Number of inputs per fuzz target.
 ///
@@ -423,7 +428,7 @@ fn fuzz_targets() -> Vec<String> {
 ///
 /// Each fuzz target starts from its corpus, the stored inputs.
 fn nightly() -> Vec<Step> {
-    let mut steps = Vec::new();
+    let mut steps = vec![step("fuzz smoke, cargo-fuzz", ADD_CARGO_FUZZ)];
     for target in fuzz_targets() {
         // Findings go to a folder that is not part of the corpus; libFuzzer fails if the folder does not exist.
         let found = format!("target/fuzz/{target}");

@@ -203,7 +203,7 @@ fn elf(example: &str) -> PathBuf {
     folder.join("firmware/examples").join(example)
 }
 
-/// Links a firmware image with a panic handler that cannot be linked, which proves that no panic is reachable.
+/// Links a firmware image with a panic handler that cannot be linked: a proof that it cannot panic.
 ///
 /// Without a reachable panic, the handler is not part of the image, so that the image is the flashed one to the byte.
 fn proven(&(what, example, features, _): &Image) -> Result<PathBuf, String> {
