@@ -342,7 +342,7 @@ mod tests {
             assert!(ms > 3_000 || x_m == 0.0, "{ms}: {x_m}");
             let apart_m = (x_m - other_m).abs();
             assert!(ms < 4_500 || apart_m < 0.1, "{ms}: {x_m} and {other_m}");
-            assert!((ms >= 23_000) == (x_m == 100.0), "{ms}: {x_m}");
+            assert_eq!(one.is_moving(), ms < 23_000, "{ms}: {x_m}");
         }
         // Without a beginning, after the longest wait.
         one.steer(at_ms(30_000), place(0.0), span, None);
