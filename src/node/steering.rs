@@ -1,6 +1,4 @@
-//! Setpoint on the way to the position that the chain has agreed on.
-//!
-//! The setpoint is limited by the [guard](crate::guard), if there is one.
+//! Setpoint on the way to the agreed position. Limited by the [guard](crate::guard), or without a guard the agreed position.
 
 use super::context::{earliest, tenths};
 use crate::features::{DEPARTURES, GUARD};
@@ -11,26 +9,25 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Interval at which fence messages to the neighbours are repeated, because a message can be lost.
-///
-/// A fence is a plane at right angles to the x axis, which keeps two neighbours on opposite sides.
+/// Time after which the relay repeats its fence messages to the neighbours: a message can be lost. A fence is the plane across x that keeps
+/// two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
-/// Moves a relay's setpoint to the position that the chain has agreed on, as far as the guard permits.
+/// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
 #[derive(Clone, Debug)]
 pub(crate) struct Steering {
     guard: Option<Guard>,
     remind_at: Option<Instant>,
-    /// Setpoint last reported to the firmware; `None` if there was none.
+    /// Setpoint last reported to the firmware; `None` if the relay had no setpoint then.
     reported_setpoint: Option<Placement>,
-    /// Stepwise motion to a new agreed position. Empty without the feature `departures`.
+    /// Stepwise motion to a new agreed position; the array is empty without the feature `departures`.
     way: [Way; DEPARTURES as usize],
 }
 
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
-/// Motion to a new agreed position: start time, duration, time of the next step, and steps made.
+/// Motion to a new agreed position: start, duration, time of the next step, steps made.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     since: Instant,
@@ -47,10 +44,11 @@ const WAIT: Duration = Duration::from_millis(15_000);
 /// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that they arrive together.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position at the last call of `advance`. `wanted`, the position to fly to now, approaches it in steps.
+    /// Agreed position at the last call of `advance`. The next field, `wanted`, is the position to fly to now: it approaches the agreed
+    /// position in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
-    /// Motion to the agreed position; `None` once the motion has ended.
+    /// Motion to the agreed position; `None` once the position to fly to has reached the agreed position.
     motion: Option<Motion>,
 }
 
@@ -61,7 +59,7 @@ impl Way {
         motion: None,
     };
 
-    /// Returns the position to fly to at `now`; `None` without an agreed position. If `agreed` has changed, the
+    /// Returns the position to fly to at `now`; `None` without an agreed position. If the agreed position `agreed` has changed, the
     /// position to fly to moves there in 32 steps within the time `span`.
     ///
     /// The motion begins at `begin`, the same time at all relays of the view, or after [`WAIT`] if it is not known before.
@@ -100,7 +98,7 @@ impl Way {
         self.wanted
     }
 
-    /// Makes all steps of the current motion that are due at `now`.
+    /// Moves the position to fly to. It makes all steps of the current motion that are due at `now`.
     fn step(&mut self, now: Instant) {
         let (Some(motion), Some(from), Some(to)) = (&mut self.motion, self.wanted, self.agreed)
         else {
@@ -146,8 +144,7 @@ impl Steering {
         way: [Way::NONE; DEPARTURES as usize],
     };
 
-    /// Creates the guard, if `settings` request one. `neighbours` are the node numbers of the upstream and the
-    /// downstream neighbour.
+    /// Creates the guard, if `settings` request a guard. `neighbours` are the node numbers on the two sides.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,
@@ -205,7 +202,7 @@ impl Steering {
         matches!(&self.way[..], [way] if way.motion.is_some())
     }
 
-    /// Returns the position at which the motion would stop now; `None` until the chain has agreed.
+    /// Returns the position to fly to if the motion stops now; `None` until the chain has agreed.
     pub(crate) fn stopped(&self) -> Option<Placement> {
         self.way.first()?.wanted
     }
@@ -251,8 +248,8 @@ impl Steering {
         }
     }
 
-    /// Records that from `now` on the drone follows the setpoints, or does not (`flown`). Returns true if this changes
-    /// the guard's state.
+    /// Records at `now` that the drone follows the setpoints (`flown` is true) or does not (false). Returns true if this changes the state
+    /// of the guard.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -261,8 +258,8 @@ impl Steering {
         is_news
     }
 
-    /// Restarts the guard with a new x axis, because the positions of Tx and Rx have changed. `now` is `None` after a
-    /// start of the relay.
+    /// Restarts the guard with another x axis, because the positions of Tx and Rx have changed. `now` is `None` after
+    /// a start of the relay.
     pub(crate) fn switch_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
             guard.leave_line(now);
@@ -283,10 +280,9 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint.
-    ///
-    /// These relays are no longer in the air. `others` is true if the view still has relays at this side. Until the
-    /// guard has received a message of one of them, it does not move the setpoint toward this side.
+    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air. `others` is true if
+    /// some relays of the view at this side are not lost. Until the guard has received a message of one of these relays, it does not move
+    /// the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
@@ -297,12 +293,12 @@ impl Steering {
         self.known_guard()?.hold_reason(side)
     }
 
-    /// Returns the neighbour's agreed position at `side`. `None` while this position is unknown, and without a guard.
+    /// Returns the agreed position of the neighbour at `side`. `None` while it is unknown, and without a guard.
     pub(crate) fn neighbour_place(&self, side: Side) -> Option<Placement> {
         self.known_guard()?.neighbour_place(side)
     }
 
-    /// Returns the next fence message, with its side and destination node; `None` if none is pending.
+    /// Returns the next fence message, with its side and its destination node; `None` if none is pending.
     pub(crate) fn poll_transmit(&mut self) -> Option<(Side, u16, Fence)> {
         self.guard()?.poll()
     }
@@ -325,7 +321,7 @@ mod tests {
         Instant::ZERO + Duration::from_millis(ms)
     }
 
-    /// Checks that relays that learn their positions at different times begin the motion together.
+    /// Checks that relays that learn their positions at different times move together.
     #[test]
     fn relays_begin_at_the_same_time() {
         let span = Duration::from_millis(20_000);
@@ -346,7 +342,7 @@ mod tests {
             assert!(ms > 3_000 || x_m == 0.0, "{ms}: {x_m}");
             let apart_m = (x_m - other_m).abs();
             assert!(ms < 4_500 || apart_m < 0.1, "{ms}: {x_m} and {other_m}");
-            assert!((ms >= 23_000) == (x_m >= 100.0), "{ms}: {x_m}");
+            assert_eq!(one.is_moving(), ms < 23_000, "{ms}: {x_m}");
         }
         // Without a beginning, after the longest wait.
         one.steer(at_ms(30_000), place(0.0), span, None);
@@ -367,7 +363,7 @@ mod tests {
         let mut reached_m = 0.0;
         let mut agreed = None;
         for step in 0..20 {
-            // A new agreed position every second, each a little farther away.
+            // Every second another agreement, a little farther.
             agreed = place(100.0 + step as f32 / 10.0);
             steering.steer(at_ms(1_000 * step), agreed, span, Some(at_ms(0)));
             let x_m = steering.setpoint(agreed).unwrap().x_m;
