@@ -3,6 +3,7 @@
 use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
 use super::own::Own;
+use crate::features::DEPARTURES;
 use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
@@ -347,9 +348,9 @@ impl FenceOwner {
         }
         let other_m = own.goal_of(self.association.node, self.target_m);
         // A relay with the order to leave holds its position: its neighbours get all the room up to it.
-        let goal = if own.leaver == own.node {
+        let goal = if DEPARTURES && own.leaver == own.node {
             own.goal_m() + best
-        } else if own.leaver == self.association.node {
+        } else if DEPARTURES && own.leaver == self.association.node {
             other_m
         } else {
             0.5 * (own.goal_m() + other_m + best)

@@ -27,13 +27,13 @@ pub(crate) struct Steering {
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
-/// Motion to a new agreed position: start, duration, time of the next step, steps made.
+/// Motion to a new agreed position: start, duration, time of the next step, part of the way.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     since: Instant,
     span: Duration,
     at: Instant,
-    steps: u8,
+    done: f32,
     /// True while the common begin is not known yet.
     waits: bool,
 }
@@ -89,7 +89,7 @@ impl Way {
                 since,
                 span,
                 at: since,
-                steps: 0,
+                done: 0.0,
                 waits: begin.is_none(),
             });
         }
@@ -116,16 +116,12 @@ impl Way {
             (self.motion, self.wanted) = (None, Some(to));
             return;
         };
-        let each = Duration::from_micros((motion.span.as_micros() >> STEPS).max(1));
-        let next = motion.since + each.times(u32::from(steps) + 1);
-        motion.at = if next > now { next } else { now + each };
+        motion.at = now + Duration::from_micros((motion.span.as_micros() >> STEPS).max(1));
         // Slow at both ends, where a relay that is late costs most.
-        let done = |steps: u8| {
-            let part = f32::from(steps) / 32.0;
-            part * part * (3.0 - 2.0 * part)
-        };
-        let before = done(core::mem::replace(&mut motion.steps, steps));
-        let part = (done(steps) - before) / (1.0 - before);
+        let part = f32::from(steps) / 32.0;
+        let done = part * part * (3.0 - 2.0 * part);
+        let part = (done - motion.done) / (1.0 - motion.done);
+        motion.done = done;
         let between = |from: f32, to: f32| from + (to - from) * part;
         self.wanted = Some(Placement {
             x_m: between(from.x_m, to.x_m),
