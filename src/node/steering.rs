@@ -116,7 +116,9 @@ impl Way {
             (self.motion, self.wanted) = (None, Some(to));
             return;
         };
-        motion.at = now + Duration::from_micros((motion.span.as_micros() >> STEPS).max(1));
+        let each = Duration::from_micros((motion.span.as_micros() >> STEPS).max(1));
+        let next = motion.since + each.times(u32::from(steps) + 1);
+        motion.at = if next > now { next } else { now + each };
         // Slow at both ends, where a relay that is late costs most.
         let part = f32::from(steps) / 32.0;
         let done = part * part * (3.0 - 2.0 * part);
