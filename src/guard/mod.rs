@@ -578,6 +578,15 @@ impl Guard {
             .or_else(|| self.pending(side))
     }
 
+    /// Returns true if a lost relay toward `side` may still hover, because no operator has reported it as gone.
+    pub fn has_lost(&self, side: Side) -> bool {
+        let keep_out = match side {
+            Side::Upstream => &self.follower.keep_out,
+            Side::Downstream => &self.owner.keep_out,
+        };
+        keep_out.limit_m().is_some()
+    }
+
     /// Returns the agreed position of the neighbour at `side`; `None` while it is unknown.
     pub fn neighbour_place(&self, side: Side) -> Option<Placement> {
         match side {

@@ -287,6 +287,11 @@ impl Steering {
         }
     }
 
+    /// Returns true if a lost relay toward `side` may still hover.
+    pub(crate) fn has_lost(&self, side: Side) -> bool {
+        self.known_guard().is_some_and(|guard| guard.has_lost(side))
+    }
+
     pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.known_guard()?.hold_reason(side)
     }

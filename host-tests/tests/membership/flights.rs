@@ -70,6 +70,24 @@ fn drones_keep_away_from_a_silent_hovering_drone() {
     }
 }
 
+/// Checks that a spare is not called to a gap in which a lost drone may still hover.
+#[test]
+fn no_spare_is_called_beside_a_lost_drone() {
+    for seed in 1..=10 {
+        let mut setup = guarded(&mut ChaCha8Rng::seed_from_u64(seed));
+        setup.spares = vec![5];
+        setup.kills = vec![(4, seconds(60))];
+        setup.leaves = vec![(2, seconds(120), None)];
+        end_at(&mut setup, seconds(400));
+        let outcome = run(setup.clone()).unwrap();
+        let leased = |relay: usize| outcome.relays[relay - 1].observed.leased;
+        let members: Vec<usize> = (1..=8)
+            .filter(|relay| *relay != 4 && leased(*relay))
+            .collect();
+        assert_eq!(members, [1, 3, 6, 7, 8], "SEED={seed}");
+    }
+}
+
 /// Checks that drones keep apart while a relay leaves. Its drone then hovers at its place.
 #[test]
 fn drones_keep_away_from_a_relay_that_leaves() {

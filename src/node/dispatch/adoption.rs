@@ -135,9 +135,10 @@ impl Node {
         } else {
             Leaving::respacing(&self.member.settings)
         };
-        let leaver = match self.leaves() {
-            Some(_) if !self.steering.is_moving() => self.member.node,
-            _ => self.layers.lease.orders().leaver,
+        // The order comes first: a relay that also requests to leave closes up to the relay that leaves now.
+        let leaver = match self.layers.lease.orders().leaver {
+            0 if self.leaves().is_some() && !self.steering.is_moving() => self.member.node,
+            ordered => ordered,
         };
         self.steering.set_leaver(leaver);
         // All relays know the turn of the first renewal by then.

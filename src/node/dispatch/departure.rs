@@ -392,7 +392,9 @@ impl Node {
 
     /// Returns true if the leader calls node `to` at `side`, outside of the chain, to join the chain.
     pub(super) fn calls(&self, side: Side, to: u16) -> bool {
-        self.layers.lease.orders().joiner == to && self.is_beside(side, to)
+        self.layers.lease.orders().joiner == to
+            && self.is_beside(side, to)
+            && !self.steering.has_lost(side)
     }
 
     /// Updates the position at which this relay counts as in place; `wanted` is the position to fly to. `None` if there
@@ -516,7 +518,8 @@ impl Node {
                 self.steering.set_neighbour(side, None);
             } else if !hello.ready {
                 self.layers.leaving.waiting = Some((side, from));
-            } else if self.is_beside(side, from) {
+            } else if self.is_beside(side, from) && !self.steering.has_lost(side) {
+                // Beside a lost drone that may still hover, a spare could fly into it.
                 self.layers.leaving.heard_spare = Some((from, now));
             }
             return true;
