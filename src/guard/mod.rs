@@ -578,7 +578,7 @@ impl Guard {
             .or_else(|| self.pending(side))
     }
 
-    /// Returns true if a lost relay toward `side` may still hover, because no operator has reported it as gone.
+    /// Returns true if a lost relay toward `side` may still hover: no operator has reported it as gone.
     pub fn has_lost(&self, side: Side) -> bool {
         let keep_out = match side {
             Side::Upstream => &self.follower.keep_out,
