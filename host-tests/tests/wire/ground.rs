@@ -91,11 +91,12 @@ fn messages_that_the_ground_may_not_send_are_misaddressed() {
 
 #[test]
 fn only_near_relays_with_a_key_accept_the_ground() {
-    for (own, ground, port) in [
-        (2_u16, 0, Port::Upstream),
-        (7, 9, Port::Downstream),
-        (5, 0, Port::Shared),
-        (4, 9, Port::Shared),
+    // On a shared channel relays accept frames of Tx and Rx from up to eight numbers away.
+    for (own, ground, relays, port) in [
+        (2_u16, 0, 8, Port::Upstream),
+        (7, 9, 8, Port::Downstream),
+        (9, 0, 12, Port::Shared),
+        (4, 13, 12, Port::Shared),
     ] {
         let near = own.abs_diff(ground).min(4).abs_diff(ground);
         let far = settings(wiring(port));
@@ -104,7 +105,7 @@ fn only_near_relays_with_a_key_accept_the_ground() {
             ..settings(Wiring::Shared)
         };
         for (own, settings, port) in [(own, far, port), (near, unsigned, Port::Shared)] {
-            let mut bench = Bench::with(paper(8), own, settings);
+            let mut bench = Bench::with(paper(relays), own, settings);
             let bytes = super::bench::frame_between(ground, own, &upload(1, bench.mission));
             let now = bench.now;
             bench.handle_bytes(now, port, &bytes);
