@@ -1,6 +1,6 @@
 //! Reader of the `--config` file of all tools. Its keys become options in front of the command line's.
 //!
-//! So every number has one name and one check, and the command line overrides the file.
+//! Every number therefore has one name and one check, and the command line overrides the file.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

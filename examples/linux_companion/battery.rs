@@ -60,7 +60,7 @@ impl Battery {
 
     /// Returns true while a starting relay waits for its endurance.
     ///
-    /// So a relay that restarts with a low battery leaves the chain before it takes part in an agreement.
+    /// A relay that restarts with a low battery thereby leaves the chain before it takes part in an agreement.
     pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
         let left_s = relay.endurance_s(now);
         if left_s.is_some() && left_s < relay.endurance_limit_s() {

@@ -101,7 +101,7 @@ impl Autopilot {
 
     /// Processes bytes from the autopilot, and exchanges data with the relay.
     ///
-    /// So the relay's next frames contain the drone's newest position.
+    /// The relay's next frames then contain the drone's newest position.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         self.receive(now);
         self.link.exchange(relay, now);

@@ -52,7 +52,7 @@ pub(crate) fn stop() -> ! {
 
 /// Panic handler that makes the link fail if it is used.
 ///
-/// So an image that links has no reachable panic, which `cargo cost` proves.
+/// An image that links has no reachable panic, which `cargo cost` proves.
 #[cfg(prove_no_panic)]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {

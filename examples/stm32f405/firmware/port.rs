@@ -21,7 +21,7 @@ pub(crate) const RECEIVED: usize = 128;
 
 /// Capacity of the send queue, bytes: more than the longest frame.
 ///
-/// So the main loop can sleep while a frame is sent.
+/// The main loop can sleep while a frame is sent.
 pub(crate) const OUTGOING: usize = 256;
 
 pub(crate) type Queues<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> =

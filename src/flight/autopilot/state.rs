@@ -15,7 +15,7 @@
 //! | PX4 | other than OFFBOARD, `system_status` ACTIVE (4) | start, restart, disarming; `system_status` CRITICAL (5) or above; nothing received for 0.8 s; no echo of the last 1.5 s; a position that arrives 1 s late; a target that is sent 0.6 s late |
 //! | ArduCopter | other than GUIDED, not CRITICAL | start, restart, disarming; no heartbeat for 3 s |
 //!
-//! So a link that finds OFFBOARD or GUIDED granted at its start takes no control and sends no targets. The pilot must
+//! A link that finds OFFBOARD or GUIDED granted at its start takes no control and sends no targets. The pilot must
 //! first choose a different mode, and the operator is informed of this. Only the pilot's choice of a mode ends a PX4's
 //! failsafe. Nothing else changes a state: no setpoint, and no message of a neighbour.
 

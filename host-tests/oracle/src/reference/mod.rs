@@ -7,7 +7,7 @@
 //! The only analysis used is the *number* of extrema. Let d >= 0 be the distance beyond the sender. A hop's SIR is a
 //! quotient of two quadratics in d with equal leading coefficients, so its derivative has the sign of a quadratic in d.
 //! The product of that quadratic's roots is -(height difference)^2 <= 0, so at most one extremum is beyond the sender.
-//! So the SIR only falls, only rises, has one minimum (interferer ahead) or one maximum (interferer behind), and
+//! The SIR therefore only falls, only rises, has one minimum (interferer ahead) or one maximum (interferer behind), and
 //! bisection is safe.
 //!
 //! With noise nu = N eta / P and s = (d - u)^2 + a^2, the derivative has the sign of u d^2 - (u^2 + a^2 - b^2) d - u

@@ -29,7 +29,7 @@ const PEN: u32 = 4;
 const APART: f64 = 105.0;
 /// Shift of a curve's markers along the curve for each colour number, in picture units.
 ///
-/// So the markers of curves that coincide are next to each other.
+/// The markers of curves that coincide are then next to each other.
 const APART_BY_HUE: u8 = 25;
 
 /// Error: the chart cannot be drawn, for this reason.
