@@ -861,8 +861,8 @@ impl PendingReports {
 
 /// Returns the bit of the relay at `distance`, 1 to 8, in a bit mask; 0 for other distances.
 const fn bit(distance: u16) -> u8 {
-    match 1_u8.checked_shl(distance.saturating_sub(1) as u32) {
-        Some(bit) => bit,
-        None => 0,
+    match distance {
+        1..=8 => 1 << (distance - 1),
+        _ => 0,
     }
 }
