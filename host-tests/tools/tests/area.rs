@@ -791,7 +791,7 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
     let output = cargo_plan(folder.path(), &["--scenario", "listen.toml", "--uavs", "6"]);
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
-        table.contains("listening: if the interferer is in ")
+        table.contains("listening: in 100.0 % of the area the relays would locate the interferer")
             && table
                 .matches("simulated with the interferer at x = ")
                 .count()
@@ -815,8 +815,7 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
         assert!(locating.get(key).is_none(), "{locating}");
     }
     let table = String::from_utf8(cargo_plan(folder.path(), &far).stdout).unwrap();
-    let part =
-        "median of the error (standard deviation) not limited, largest error not limited at x = ";
+    let part = "standard deviation of the located position: median not limited, largest not limited at x = ";
     assert!(table.contains(part), "{table}");
     std::fs::write(
         folder.path().join("deaf.toml"),

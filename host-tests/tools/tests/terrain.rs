@@ -1015,7 +1015,8 @@ fn drones_return_above_the_ground_beside_the_chain() {
         let page = read("page.txt");
         let said = format!("return to launch: {return_m:.0} m above home");
         assert!(
-            page.contains(&said) && page.contains("450.0 to 9"),
+            page.contains(&said)
+                && page.contains("lowest and highest ground on these ways home: 450.0 and 9"),
             "{page}"
         );
         assert!(read("ardupilot.parm").contains(&format!("RTL_ALT,{}\n", 100.0 * return_m)));

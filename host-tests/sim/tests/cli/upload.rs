@@ -233,7 +233,8 @@ fn an_upload_changes_the_hypothetical_interferer() {
     assert!(output.status.success());
     let notes = String::from_utf8(output.stderr).unwrap();
     assert!(
-        notes.contains("replaces all") && notes.contains("an upload changes this interferer"),
+        notes.contains("replaces all interferers of the scenario")
+            && notes.contains("--upload changes the interferer that the relays use"),
         "{notes}"
     );
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
