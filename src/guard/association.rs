@@ -366,6 +366,16 @@ impl KeepOut {
         });
     }
 
+    /// Returns true if the new neighbour `node` at `x_m` may be on the wrong side of a lost drone along x. Between the
+    /// two numbers, `node` is the nearer one to this relay, so its x has to be at least the separation nearer, too.
+    /// The new neighbour knows nothing of the lost drone.
+    pub(super) fn bars(&self, side: Side, node: u16, x_m: f32) -> bool {
+        self.lost.is_some_and(|(lost, limit_m)| match side {
+            Side::Upstream => lost != 0 && lost < node && x_m < limit_m,
+            Side::Downstream => lost != u16::MAX && lost > node && x_m > limit_m,
+        })
+    }
+
     /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Nodes beyond `node`
     /// are no obstacles for this relay, because `node` is between them and this relay. The obstacles are lost relays,
     /// or drones that do not fly to setpoints.
@@ -402,6 +412,16 @@ impl KeepOut {
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
+    }
+
+    /// Returns the reason why a neighbour without an association (session) stops this relay: `Lost` beside a lost
+    /// drone, which the neighbour may have to pass, otherwise `Unheard`.
+    pub(super) const fn unpaired_reason(&self) -> HoldReason {
+        if self.lost.is_some() {
+            HoldReason::Lost
+        } else {
+            HoldReason::Unheard
+        }
     }
 
     /// Returns `HoldReason::NotFlown` if the neighbour `node` does not follow setpoints, else `otherwise`.

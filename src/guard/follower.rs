@@ -138,6 +138,10 @@ impl FenceFollower {
         }
         self.keep_out.remove_unflown();
         if self.association.peer_number == 0 {
+            let node = self.association.node;
+            if fence.number == 0 && self.keep_out.bars(Side::Upstream, node, fence.x_m) {
+                return;
+            }
             self.association.pair(fence.association);
         } else if fence.association != self.association.peer_number
             && self.association.count_foreign()
@@ -315,7 +319,7 @@ impl FenceFollower {
             return Some(HoldReason::Order);
         }
         if !self.has_fence() {
-            return Some(HoldReason::Unheard);
+            return Some(self.keep_out.unpaired_reason());
         }
         let step_m = target_m - self.target_m + own.config.rounding();
         (step_m < self.agreed_m.min(own.config.separation_m)).then_some(HoldReason::Close)

@@ -224,10 +224,13 @@ impl FenceOwner {
         }
         self.keep_out.remove_unflown();
         if !self.has_reply() && fence.echo == self.association.own_number {
+            let node = self.association.node;
+            if self.keep_out.bars(Side::Downstream, node, fence.x_m) {
+                return;
+            }
             self.association.pair(fence.association);
             self.association.due = true;
-            self.keep_out
-                .on_fence(Side::Downstream, self.association.node);
+            self.keep_out.on_fence(Side::Downstream, node);
         }
         if !self.association.is_current(fence.association, fence.echo) {
             if self.has_reply() && self.association.count_foreign() {
@@ -431,7 +434,7 @@ impl FenceOwner {
             return None;
         }
         if !self.has_reply() {
-            return Some(HoldReason::Unheard);
+            return Some(self.keep_out.unpaired_reason());
         }
         if !self.is_beyond(own) {
             return Some(HoldReason::Order);

@@ -194,6 +194,74 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
+/// Checks rule 9: a relay that joins beside a lost drone holds its position if it is on the wrong side of this drone
+/// along x. Otherwise it could fly through the drone, of which it knows nothing.
+#[test]
+fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
+    // Relay 3 is lost at 300 m: relay 2 joins between relay 1 and it.
+    for (x_m, joins) in [(320.0, false), (295.0, false), (290.0, true), (250.0, true)] {
+        let mut one = One::new([None, Some(3)], 100.0, 400.0);
+        let mut lost = One::new([Some(1), None], 300.0, 300.0);
+        for _ in 0..4 {
+            lost.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+            one.receive(Side::Downstream, 3, lost.sent(Side::Upstream));
+        }
+        assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
+        one.guard.commit(at(100.0));
+        one.setpoint();
+        one.is_at(100.0);
+        one.is_at(100.0);
+        one.guard.set_neighbour(Side::Downstream, None);
+        let mut fresh = One::new([Some(1), None], x_m, 200.0);
+        one.guard.set_neighbour(Side::Downstream, Some(2));
+        let mut talk = |one: &mut One| {
+            for _ in 0..4 {
+                fresh.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+                one.receive(Side::Downstream, 2, fresh.sent(Side::Upstream));
+            }
+            fresh.setpoint()
+        };
+        let expected_m = if joins { 200.0 } else { x_m };
+        assert_eq!(talk(&mut one).to_bits(), expected_m.to_bits(), "{x_m}");
+        assert_eq!(one.guard.has_lost(Side::Downstream), !joins);
+        let reason = one.guard.hold_reason(Side::Downstream);
+        assert_eq!(reason, (!joins).then_some(HoldReason::Lost), "{x_m}");
+        one.guard.forget(Side::Downstream, false);
+        assert_eq!(talk(&mut one).to_bits(), 200.0_f32.to_bits(), "{x_m}");
+    }
+    // Relay 2 is lost at 300 m: relay 3 joins between it and relay 4.
+    for (x_m, joins) in [(280.0, false), (305.0, false), (310.0, true), (350.0, true)] {
+        let mut last = One::new([Some(2), None], 500.0, 200.0);
+        let mut lost = One::new([None, Some(4)], 300.0, 300.0);
+        for _ in 0..4 {
+            lost.receive(Side::Downstream, 4, last.sent(Side::Upstream));
+            last.receive(Side::Upstream, 2, lost.sent(Side::Downstream));
+        }
+        assert_eq!(last.setpoint().to_bits(), 310.0_f32.to_bits());
+        last.guard.commit(at(500.0));
+        last.setpoint();
+        last.is_at(500.0);
+        last.is_at(500.0);
+        last.guard.set_neighbour(Side::Upstream, None);
+        let mut fresh = One::new([None, Some(4)], x_m, 400.0);
+        last.guard.set_neighbour(Side::Upstream, Some(3));
+        let mut talk = |last: &mut One| {
+            for _ in 0..4 {
+                fresh.receive(Side::Downstream, 4, last.sent(Side::Upstream));
+                last.receive(Side::Upstream, 3, fresh.sent(Side::Downstream));
+            }
+            fresh.setpoint()
+        };
+        let expected_m = if joins { 400.0 } else { x_m };
+        assert_eq!(talk(&mut last).to_bits(), expected_m.to_bits(), "{x_m}");
+        assert_eq!(last.guard.has_lost(Side::Upstream), !joins);
+        let reason = last.guard.hold_reason(Side::Upstream);
+        assert_eq!(reason, (!joins).then_some(HoldReason::Lost), "{x_m}");
+        last.guard.forget(Side::Upstream, false);
+        assert_eq!(talk(&mut last).to_bits(), 400.0_f32.to_bits(), "{x_m}");
+    }
+}
+
 /// Checks that a relay does not approach the relays beyond a removed neighbour too early. It first has to receive one
 /// of them.
 #[test]
