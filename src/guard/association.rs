@@ -331,6 +331,8 @@ pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
     /// is lost.
     lost: Option<(u16, f32)>,
+    /// Number of the nearest lost node whose x was known, and the limit of x because of it, m. 0 without such a node.
+    known: (u16, f32),
     /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if no lost relay is near.
     /// Until this relay is at this x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
@@ -345,6 +347,7 @@ impl KeepOut {
     pub(super) const fn none() -> Self {
         Self {
             lost: None,
+            known: (0, 0.0),
             near_m: f32::NAN,
             disordered: false,
             unflown: None,
@@ -356,24 +359,34 @@ impl KeepOut {
     }
 
     /// Adds a lost relay at `side` as an obstacle. The lost relay has the number `node`, and limits this relay's x to
-    /// `limit_m`, m. If there already is a lost relay, the nearer node and the tighter limit are kept.
+    /// `limit_m`, m. If there already is a lost relay, the nearer node and the tighter limit are kept. `is_known` is
+    /// true if the x of the lost relay was known.
     #[inline(never)] // called from both sides
-    pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32) {
-        let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
-        self.lost = Some(match side {
+    pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32, is_known: bool) {
+        let join = |(nearest, tightest_m): (u16, f32)| match side {
             Side::Upstream => (nearest.max(node), tightest_m.max(limit_m)),
             Side::Downstream => (nearest.min(node), tightest_m.min(limit_m)),
-        });
+        };
+        self.lost = Some(join(self.lost.unwrap_or((node, limit_m))));
+        if is_known {
+            let (before, _) = self.known;
+            let first = (node, limit_m);
+            self.known = join(if before == 0 { first } else { self.known });
+        }
     }
 
-    /// Returns true if the new neighbour `node` at `x_m` may be on the wrong side of a lost drone along x. Between the
-    /// two numbers, `node` is the nearer one to this relay, so its x has to be at least the separation nearer, too.
-    /// The new neighbour knows nothing of the lost drone.
-    pub(super) fn bars(&self, side: Side, node: u16, x_m: f32) -> bool {
-        self.lost.is_some_and(|(lost, limit_m)| match side {
-            Side::Upstream => lost != 0 && lost < node && x_m < limit_m,
-            Side::Downstream => lost != u16::MAX && lost > node && x_m > limit_m,
-        })
+    /// Returns true if the new neighbour `node` at `x_m` may be on the wrong side of a lost drone along x. The number
+    /// of `node` is between that of this relay and that of the lost drone, so its x has to be between them, too. The
+    /// new neighbour knows nothing of the lost drone.
+    pub(super) fn bars(&self, side: Side, node: u16, x_m: f32, config: &GuardConfig) -> bool {
+        let (known, limit_m) = self.known;
+        // The lost drone is at least this far beyond the limit.
+        let beyond_m = config.separation_m - 2.0 * config.hover_m - config.rounding();
+        known != 0
+            && match side {
+                Side::Upstream => known < node && x_m < limit_m - beyond_m,
+                Side::Downstream => known > node && x_m > limit_m + beyond_m,
+            }
     }
 
     /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Nodes beyond `node`
@@ -386,6 +399,9 @@ impl KeepOut {
         };
         if self.lost.is_some_and(|(lost, _)| is_beyond(lost)) {
             self.clear();
+        }
+        if is_beyond(self.known.0) {
+            self.known = (0, 0.0);
         }
         if self.unflown.is_some_and(|(unflown, _)| is_beyond(unflown)) {
             self.unflown = None;

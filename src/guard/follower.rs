@@ -71,7 +71,8 @@ impl FenceFollower {
             // Distance to be added if the neighbour was permitted to be closer than the separation, or was never
             // received.
             let missing_m = separation_m - self.requested_m.min(self.agreed_m).min(separation_m);
-            keep_out.add_lost(Side::Upstream, self.association.node, limit_m + missing_m);
+            let (node, is_known) = (self.association.node, self.has_fence());
+            keep_out.add_lost(Side::Upstream, node, limit_m + missing_m, is_known);
             if missing_m > 0.0 {
                 keep_out.mark_near(limit_m + missing_m);
             } else if !self.has_fence() {
@@ -113,7 +114,7 @@ impl FenceFollower {
         self.renew(own, jitter);
         if !was_absent {
             let (node, at_m) = (self.association.node, own.reachable.setpoint_m);
-            self.keep_out.add_lost(Side::Upstream, node, at_m);
+            self.keep_out.add_lost(Side::Upstream, node, at_m, false);
         }
         if is_ordered {
             self.association.mark_absent(association);
@@ -139,7 +140,8 @@ impl FenceFollower {
         self.keep_out.remove_unflown();
         if self.association.peer_number == 0 {
             let node = self.association.node;
-            if fence.number == 0 && self.keep_out.bars(Side::Upstream, node, fence.x_m) {
+            let keep_out = &self.keep_out;
+            if fence.number == 0 && keep_out.bars(Side::Upstream, node, fence.x_m, &own.config) {
                 return;
             }
             self.association.pair(fence.association);

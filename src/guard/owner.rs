@@ -69,7 +69,8 @@ impl FenceOwner {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
             let limit_m = self.max_x(own, own.config.separation_m);
-            keep_out.add_lost(Side::Downstream, self.association.node, limit_m);
+            let is_known = self.has_reply() && self.is_beyond(own);
+            keep_out.add_lost(Side::Downstream, self.association.node, limit_m, is_known);
             if !self.is_ordered(own) {
                 keep_out.mark_near(limit_m - own.config.separation_m);
             } else if self.has_reduced_step(own) || !self.clear {
@@ -109,7 +110,7 @@ impl FenceOwner {
         self.renew(own, jitter);
         if !was_absent {
             let (node, at_m) = (self.association.node, own.reachable.setpoint_m);
-            self.keep_out.add_lost(Side::Downstream, node, at_m);
+            self.keep_out.add_lost(Side::Downstream, node, at_m, false);
         }
         if is_ordered {
             self.association.mark_absent(association);
@@ -225,7 +226,8 @@ impl FenceOwner {
         self.keep_out.remove_unflown();
         if !self.has_reply() && fence.echo == self.association.own_number {
             let node = self.association.node;
-            if self.keep_out.bars(Side::Downstream, node, fence.x_m) {
+            let keep_out = &self.keep_out;
+            if keep_out.bars(Side::Downstream, node, fence.x_m, &own.config) {
                 return;
             }
             self.association.pair(fence.association);

@@ -88,6 +88,38 @@ fn no_spare_is_called_beside_a_lost_drone() {
     }
 }
 
+/// Checks that a spare that an operator lets join, at any x beside the line, does not fly through a lost drone.
+#[test]
+fn a_spare_joins_at_any_x_and_keeps_away_from_a_lost_drone() {
+    let mut joined = 0;
+    for seed in 1..=60 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut setup = guarded(&mut rng);
+        let spare = rng.random_range(2..=7);
+        let lost = if rng.random_bool(0.5) {
+            spare - 1
+        } else {
+            spare + 1
+        };
+        setup.spares = vec![spare];
+        let flight = setup.flight.as_mut().unwrap();
+        let aside_m = rng.random_range(6.0..40.0_f64);
+        flight.start[usize::from(spare) - 1] = [rng.random_range(0.0..1_000.0), aside_m, 20.0];
+        setup.kills = vec![(lost, seconds(60))];
+        setup.stays = vec![(spare, seconds(120))];
+        end_at(&mut setup, seconds(400));
+        let outcome = run(setup).unwrap();
+        joined += usize::from(outcome.relays[usize::from(spare) - 1].observed.leased);
+        assert!(
+            outcome.nearest_m() >= APART_M,
+            "SEED={seed}: spare {spare}, lost {lost}, {:?}",
+            outcome.nearest
+        );
+        assert_eq!(outcome.unsafe_setpoints, 0, "SEED={seed}");
+    }
+    println!("{joined} of 60 spares are in the chain");
+}
+
 /// Checks that drones keep apart while a relay leaves. Its drone then hovers at its place.
 #[test]
 fn drones_keep_away_from_a_relay_that_leaves() {

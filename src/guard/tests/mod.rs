@@ -97,8 +97,8 @@ impl One {
 }
 
 #[test]
-fn a_guard_is_at_most_432_bytes() {
-    assert!(size_of::<Guard>() <= 432, "{}", size_of::<Guard>());
+fn a_guard_is_at_most_448_bytes() {
+    assert!(size_of::<Guard>() <= 448, "{}", size_of::<Guard>());
     assert_eq!(size_of::<Fence>(), 28);
 }
 
@@ -199,7 +199,7 @@ fn a_lost_relay_is_kept_clear_of() {
 #[test]
 fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
     // Relay 3 is lost at 300 m: relay 2 joins between relay 1 and it.
-    for (x_m, joins) in [(320.0, false), (295.0, false), (290.0, true), (250.0, true)] {
+    for (x_m, joins) in [(320.0, false), (301.0, false), (299.0, true), (250.0, true)] {
         let mut one = One::new([None, Some(3)], 100.0, 400.0);
         let mut lost = One::new([Some(1), None], 300.0, 300.0);
         for _ in 0..4 {
@@ -230,7 +230,7 @@ fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
         assert_eq!(talk(&mut one).to_bits(), 200.0_f32.to_bits(), "{x_m}");
     }
     // Relay 2 is lost at 300 m: relay 3 joins between it and relay 4.
-    for (x_m, joins) in [(280.0, false), (305.0, false), (310.0, true), (350.0, true)] {
+    for (x_m, joins) in [(280.0, false), (299.0, false), (301.0, true), (350.0, true)] {
         let mut last = One::new([Some(2), None], 500.0, 200.0);
         let mut lost = One::new([None, Some(4)], 300.0, 300.0);
         for _ in 0..4 {
