@@ -8,7 +8,7 @@ use core::f64::consts::PI;
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Kind of path loss between a drone and a station on the ground.
+/// Radio propagation between a drone and a station on the ground: line of sight, obstructed, or a mix.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
@@ -28,9 +28,9 @@ pub enum AirGround {
 pub struct Channel {
     /// Path-loss factor between two drones, which have line of sight, 1/m^2.
     mu_los: f64,
-    /// Path-loss factor from the interferer to the ground receiver, without line of sight, 1/m^2.
+    /// Path-loss factor without line of sight, 1/m^2; applies from the interferer to the ground receiver.
     mu_nlos: f64,
-    /// Path-loss factor between a drone and a station on the ground, 1/m^2; the same up and down.
+    /// Path-loss factor between a drone and a station on the ground, 1/m^2; the same in both directions.
     eta: f64,
 }
 
@@ -127,7 +127,7 @@ impl Channel {
     }
 
     /// Creates a channel from its path-loss factors, 1/m^2. Returns `None` unless `mu_los` is within 1e-3 to 1e30,
-    /// `mu_nlos` within 1 to 1e20 times `mu_los`, and `eta` between the two.
+    /// `mu_nlos` within 1 to 1e20 times `mu_los`, and `eta` within `mu_los` to `mu_nlos`.
     pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
         let sound = (1e-3..=1e30).contains(&mu_los)
             && (mu_los..=1e20 * mu_los).contains(&mu_nlos)
@@ -139,9 +139,10 @@ impl Channel {
         })
     }
 
-    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`].
+    /// Returns the channel with its factor `eta` clamped to the range from `mu_los` to `mu_nlos`.
     ///
-    /// [`Channel::from_factors`] requires this. Rounding can put eta slightly outside if the two factors are equal.
+    /// [`Channel::from_factors`] requires this range. Rounding can put `eta` slightly outside if `mu_los` and `mu_nlos`
+    /// are equal.
     pub(crate) fn ordered(self) -> Self {
         Self {
             eta: self.eta.max(self.mu_los).min(self.mu_nlos),

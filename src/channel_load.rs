@@ -20,8 +20,8 @@
 use crate::time::Duration;
 use crate::wire::MAX_SWEEP;
 
-/// Maximum number of frames between two neighbours of an idle chain in the time `probe_after`. A chain is idle while
-/// all relays hold their positions.
+/// Maximum number of frames that two neighbours of an idle chain send within the time `probe_after`. A chain is idle
+/// while all relays hold their positions.
 const FRAMES: u64 = 8;
 
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
@@ -33,13 +33,13 @@ const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Maximum number of relays in range for which a transmission is assumed to find the channel free.
+/// Maximum number of relays in range for which a transmission is assumed to start without a wait.
 ///
-/// Every further nine relays add one frame time to each transmission. Nine relays are this relay, four toward Tx and
-/// four toward Rx.
+/// A transmission takes one frame time for up to nine relays, two frame times for up to 18, and so on, up to
+/// [`MOST_TURNS`]. The nine relays are this relay, four toward Tx and four toward Rx.
 const NEAR: u16 = 9;
 
-/// Maximum time assumed for one transmission, including the wait for the channel, in frame times.
+/// Maximum time assumed for one transmission with the wait for the channel, in frame times.
 const MOST_TURNS: u32 = 4;
 
 /// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
@@ -62,7 +62,7 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns 1e6 times the number of bits that the channel must be able to carry in one `probe_after`.
+    /// Returns the bits to carry in one `probe_after`, times 1e6, at the permitted use of the channel.
     ///
     /// The result divided by `probe_after` in microseconds is the minimum data rate in bit/s.
     const fn needed(self) -> u64 {
@@ -163,7 +163,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the time assumed for one transmission, including the wait for the channel, in frame times.
+    /// Returns the time assumed for one transmission with the wait for the channel, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -173,7 +173,8 @@ impl ChannelLoad {
     }
 }
 
-/// Error of [`ChannelLoad::carried`]: the channel is overloaded. The fields give limits with which it would not be.
+/// Error of [`ChannelLoad::carried`]: the channel is overloaded. Each field except `in_range` is a limit that would
+/// avoid this: a faster channel, a longer `probe_after`, or fewer relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {

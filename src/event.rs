@@ -23,7 +23,7 @@ pub enum Event {
     /// Raised at the leader, which is relay 1, or relay N if the mission gives the interference as a distribution along
     /// x. The leader tries again after `Relay::restart`, in a new view, or with a new mission.
     Infeasible,
-    /// The neighbour at `side` is lost.
+    /// The neighbour on the side `side` of this relay is lost.
     ///
     /// The neighbour has answered nothing for at least `Settings::dead_after` (15 s by default), and has left at least
     /// 16 requests unanswered. On a channel that loses frames the event is raised later, after at most eight times
@@ -36,8 +36,8 @@ pub enum Event {
         /// Index of the lost neighbour in the chain, 1 to N.
         node: u16,
     },
-    /// A lost neighbour is received again, or a new neighbour has replaced it. In the second case `node` is not the
-    /// node that was reported lost.
+    /// A lost neighbour is received again, or a different neighbour has replaced it. `node` is the present neighbour:
+    /// after a replacement it is not the node that was reported as lost.
     NeighbourBack {
         /// Side of this relay, toward Tx or toward Rx, on which the neighbour is.
         side: Side,
@@ -103,22 +103,22 @@ pub enum Event {
     /// A newer mission was rejected, and this relay keeps its present mission. The ground station is informed.
     ///
     /// The reason is one of three. The mission's distance does not fit its Tx and Rx positions on earth. The mission
-    /// exceeds this relay's own geofence. Or it has fitted slots (as long as each hop needs) that the settings do not
-    /// allow. Upload a mission without this error. Raised once for each such mission.
+    /// exceeds this relay's own geofence. The mission has fitted slots (as long as each hop needs), which the settings
+    /// do not allow. Upload a corrected mission. The event is raised once for each rejected mission.
     UploadRefused {
         /// Reason for the rejection.
         why: LineError,
     },
     /// The relay's estimate of the interference has changed (`Relay::interference_estimate`). New positions follow.
     NewEstimate,
-    /// The measurements do not fit a single source on the ground, are too few or contradict each other. Raised at the
-    /// leader. `Relay::unfit` gives the reason.
+    /// The leader cannot locate the interferer. The measurements are too few, contradict each other, or do not fit a
+    /// single source on the ground. Raised at the leader. `Relay::unfit` gives the reason.
     InterfererUnclear,
     /// A node's measurements do not fit those of all other nodes; they are ignored until they fit.
     ///
     /// An operator should check the receiver of this node. Only the leader raises this event for the transmitter and
-    /// the receiver. A relay that measures nothing at all raises this event about itself, and no other node does. With
-    /// four relays or fewer the faulty relay cannot be identified
+    /// the receiver. If a relay measures nothing at all, only this relay raises the event, with itself as the node.
+    /// With four relays or fewer the faulty relay cannot be identified
     /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
@@ -133,17 +133,17 @@ pub enum Event {
     /// The drone's remaining time of flight is unknown. Raised only if a reserve is set (`Relay::set_reserve`).
     ///
     /// Raised if a value of `Relay::handle_endurance` was invalid, if no value came for 10 s, or if no value is known
-    /// while the relay controls the drone. The relay then counts down from the last value that agreed with the value
-    /// before it, or else from the last value. If there was no valid value, the relay does not leave the chain by
-    /// itself. Raised at most once a minute while the time is unknown.
+    /// while the relay controls the drone. The relay then counts down from the last value that agreed with its
+    /// predecessor. If there is no such value, it counts down from the last value. Without any valid value, the relay
+    /// does not leave the chain by itself. Raised at most once a minute while the time is unknown.
     EnduranceUnknown,
-    /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while
-    /// this is the case.
+    /// The drone's remaining time of flight is only enough for the way home and the reserve. `Relay::set_reserve` sets
+    /// the reserve. Raised again every minute while this is the case.
     AtReserve,
-    /// A message from this relay has told a node outside of the chain that the node's drone may fly away.
+    /// Notice that a node outside of the chain has been told by this relay that its drone may fly away.
     ///
-    /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event
-    /// may be repeated.
+    /// This relay's guard (collision avoidance) still keeps clear of that drone. Once the drone has left, an operator
+    /// calls `Relay::clear_lost`. The event may be repeated.
     MayLeaveTold {
         /// Side of this relay, toward Tx or toward Rx, on which the node is.
         side: Side,
@@ -152,7 +152,7 @@ pub enum Event {
     },
 }
 
-/// Events without a node that the firmware polls first. Events about a node come next, then `POLLED_LAST`.
+/// Events that the firmware polls first; they concern no node. Events about a node follow, then those of `POLLED_LAST`.
 const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,
@@ -186,7 +186,7 @@ const POLLED_LAST: &[Event] = &[
     Event::AtReserve,
 ];
 
-/// Kind of event that concerns one node on one side of this relay.
+/// Kind of event about one node. The event is stored for the side of this relay on which the node is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum NodeEvent {
     Lost,
@@ -195,7 +195,7 @@ pub(crate) enum NodeEvent {
     Mission,
     Key,
     Epoch,
-    /// Two nodes use the same index. If that is this relay's index, the side of the event has no meaning.
+    /// Two nodes use the same index. If the index is this relay's own, the stored side has no meaning.
     Index,
     /// The measurements of the node do not fit those of all other nodes.
     Sensor,

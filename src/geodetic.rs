@@ -20,7 +20,7 @@ pub struct Geodetic {
 impl Geodetic {
     /// Returns the position nearest to these values; `None` if a value is not finite or out of range.
     ///
-    /// Latitude and longitude are in degrees, and the height above mean sea level in m, within 1e6.
+    /// Latitude and longitude are in degrees. The height above mean sea level is in m, -1e6 to 1e6.
     ///
     /// ```
     /// use uav_relay::Geodetic;
@@ -68,7 +68,8 @@ pub struct Sites {
 pub(crate) const SITES_LENGTH: usize = 24;
 
 impl Sites {
-    /// Encodes latitude, longitude and height of the transmitter, then of the receiver. Each takes four little-endian bytes.
+    /// Encodes latitude, longitude and height of the transmitter, then those of the receiver. Each of the six numbers
+    /// takes four little-endian bytes.
     pub(crate) fn to_bytes(self) -> [u8; SITES_LENGTH] {
         let Self { tx, rx } = self;
         let numbers = [
@@ -107,19 +108,20 @@ impl Sites {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance differs from the distance between its Tx and Rx positions. If the mission has no such
-    /// positions, its distance is compared with that between the relay's configured positions (`Settings::sited`).
+    /// The mission's distance differs from the distance between Tx and Rx on earth. The positions of Tx and Rx are
+    /// those in the mission, or else the relay's configured ones (`Settings::sited`).
     Distance,
     /// The mission's Tx and Rx positions are less than 10 m or more than 100 km apart.
     Sites,
-    /// The mission's range of altitudes exceeds the relay's own geofence. See
+    /// The mission's range of altitudes is not inside the relay's own geofence. See
     /// [`GuardConfig::geofence`](crate::guard::config::GuardConfig).
     Altitude,
-    /// The mission's range of lateral offsets exceeds the relay's own geofence.
+    /// The mission's range of lateral offsets is not inside the relay's own geofence.
     Lateral,
     /// The mission's distance from transmitter to receiver exceeds the relay's own geofence.
     Length,
-    /// The mission has fitted slots (`fitted_gap` above 0), which this relay's settings do not allow.
+    /// The mission has fitted time slots (`fitted_gap` above 0), which this relay's settings do not allow. A fitted
+    /// slot is as long as its hop needs.
     ///
     /// Fitted slots need the method `Joint`, no `Settings::listen`, and a known interferer.
     Slots,

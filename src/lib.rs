@@ -15,8 +15,8 @@
 
 /// Implements `Display`, `Error` and `defmt::Format` for an error enum, from one text for each variant.
 ///
-/// The texts are string literals, because `defmt` accepts nothing else. They take no flash: an image stores only their
-/// numbers. The function `text` returns them; it is a `const fn`, so a `const fn` that panics can use it.
+/// The texts are string literals, because `defmt` accepts nothing else. `defmt` stores only a number for each text in
+/// the image. The function `text` returns the text; it is a `const fn`, so that a `const fn` that panics can use it.
 macro_rules! error_texts {
     ($type:ty { $($variant:ident => $text:literal),* $(,)? }) => {
         impl $type {
@@ -107,9 +107,9 @@ mod wire;
 #[doc(hidden)]
 pub mod wire;
 
-/// Features of this build: a constant is true if the crate is built with its feature.
+/// Features of this build. Each constant is true if the crate is built with the feature of that name.
 ///
-/// Code that a false constant makes unreachable is compiled, and takes no flash.
+/// Code that can only run with a feature that is not built in is compiled, but takes no flash.
 mod features {
     pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
     pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");

@@ -233,7 +233,7 @@ mod autopilot {
         }
     }
 
-    /// Returns the entries of `relays` before the first 0, which marks an unused entry.
+    /// Returns the entries of `relays` before the first 0. Unused entries are 0, at the end of `relays`.
     fn named(relays: &[u16]) -> &[u16] {
         relays.split(|node| *node == 0).next().unwrap_or_default()
     }

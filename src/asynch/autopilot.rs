@@ -18,9 +18,10 @@ use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 use crate::serial::READ_LIMIT;
 use crate::time::Duration;
 
-/// Pause after the autopilot's port has failed, ended or accepted nothing.
+/// Pause after an operation on the autopilot's port has failed, or has transferred no byte.
 ///
-/// Also the minimum time between two data exchanges with the relay, unless an event requests an earlier one.
+/// Also the minimum time between two data exchanges with the relay. An exchange starts earlier if bytes are received or
+/// the relay raises an event.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.
@@ -83,7 +84,7 @@ impl AsyncAutopilot {
         })
     }
 
-    /// Returns true while the drone follows the relay's setpoints, also while it hovers at a setpoint.
+    /// Returns true while the relay controls the drone: the drone flies to the setpoint or hovers there.
     pub fn is_flown(&self) -> bool {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }
@@ -177,7 +178,7 @@ async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// Signal that one future raises, and for which a second future waits.
+/// Flag with a waker: one future raises the flag, and a second future waits until it is raised.
 struct Signal {
     is_raised: Cell<bool>,
     waker: Cell<Option<Waker>>,
@@ -196,7 +197,8 @@ impl Signal {
         wake(&self.waker);
     }
 
-    /// Clears the signal. The caller must then handle everything that may have raised the signal.
+    /// Clears the signal. Call it before handling the new input, so that input that arrives later raises the signal
+    /// again.
     fn clear(&self) {
         self.is_raised.set(false);
     }

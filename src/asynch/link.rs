@@ -17,15 +17,16 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
 
-/// Pause before a port that has failed or ended is used again, in byte times: 11 ms at 115 200 baud.
+/// Pause after a failure of a port or the end of its stream, in byte times (11 ms at 115 200 baud).
 const PAUSE: u32 = 128;
 
-/// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.
+/// Time in byte times for which the driver-enable pin stays high after the last byte's computed end.
 ///
-/// One byte time is for a byte that the port may still be sending, one for the tolerance of the port's clock.
+/// One byte time is for a byte that the port may still be sending. The second is for the tolerance of the port's clock.
 const PIN_HOLD: u32 = 2;
 
-/// Delimiter byte at the end of every frame. Sent before a frame, it ends a previous incomplete frame.
+/// Delimiter byte that ends every frame. After a frame that was cut off, an extra delimiter is sent before the next
+/// frame.
 const DELIMITER: [u8; 1] = [0];
 
 /// Link of a port: reader and writer, frame queue, and driver-enable pin if there is one.
@@ -79,7 +80,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// Returns two futures, one that receives and one that sends, and the queue of frames to send.
+    /// Returns the future that receives, the future that sends, and the queue of frames to send.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,
@@ -173,7 +174,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sends a frame, after a delimiter if the previous frame is possibly incomplete. Returns true on success.
+    /// Sends `frame`; returns true on success. If the previous frame is possibly incomplete, a delimiter is sent first.
     async fn send(&mut self, frame: &[u8], clock: &impl Clock) -> bool {
         if self.cut && !self.write(&DELIMITER, clock).await {
             return false;
@@ -214,8 +215,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the driver-enable pin high or low. Returns true on success, and if there is no pin. After a failure it
-    /// waits, then returns false.
+    /// Sets the driver-enable pin high or low. Returns true on success, and if there is no pin. If setting the pin
+    /// fails, the function waits for the time `pause` and returns false.
     async fn drive(
         &mut self,
         high: bool,
@@ -240,8 +241,8 @@ fn is_empty(waiting: &RefCell<Frames>) -> bool {
     waiting.try_borrow().is_ok_and(|waiting| waiting.is_empty())
 }
 
-/// Moves the next queued frame into `frame`, and completes with its length, bytes. The task that queues a frame must
-/// wake this one.
+/// Moves the next queued frame into `frame`, and completes with the frame's length, bytes. This future registers no
+/// waker: the task that queues a frame must wake the task that polls this future.
 fn next<'f>(
     waiting: &'f RefCell<Frames>,
     relay: &'f AsyncRelay<'_>,

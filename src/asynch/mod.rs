@@ -164,12 +164,12 @@ where
         }
     }
 
-    /// Moves bytes between the relay and its ports and handles its timers, forever. The documentation of
+    /// Moves bytes between the relay and its ports and handles the relay's timers, forever. The documentation of
     /// [`asynch`](self) describes the work per poll and the effect of dropping the future.
     ///
-    /// `store` writes a [changed record](Relay::unpersisted) to memory that survives a reboot, and returns true if it
-    /// is stored. Until then the relay sends nothing. Without such memory pass `|_| true`, and leave the relay off
-    /// after a reboot in flight.
+    /// `store` writes a [changed record](Relay::unpersisted) of the relay's votes to memory that survives a reboot, and
+    /// returns true if the record is stored. Until then the relay sends nothing. Without such memory pass `|_| true`,
+    /// and leave the relay off after a reboot in flight.
     pub async fn run(
         &mut self,
         relay: &AsyncRelay<'_>,
@@ -212,7 +212,8 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
         Self { channel }
     }
 
-    /// Runs the relay on its port, forever, as [`AsyncPair::run`] does on two ports.
+    /// Moves bytes between the relay and its shared port and handles the relay's timers, forever. The parameters are
+    /// those of [`AsyncPair::run`].
     pub async fn run(
         &mut self,
         relay: &AsyncRelay<'_>,
@@ -259,7 +260,7 @@ async fn run_relay(
     }
 }
 
-/// Handles the relay's due timers, stores its changed votes, and queues its frames.
+/// Handles the relay's due timers, stores its votes on views after a change, and queues its frames.
 ///
 /// Returns the time of the relay's next timeout; `None` if there is none.
 fn turn(

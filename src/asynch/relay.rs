@@ -49,8 +49,8 @@ impl<'a> AsyncRelay<'a> {
     /// Passes the relay to `work`, and wakes the task of its ports. For example, `work` reports a position or a sample.
     /// The woken task runs as soon as the calling task waits.
     ///
-    /// Returns `None`, and does nothing, inside the `work` or `look` of a call that already has the relay. Apart from
-    /// `work` the call takes constant time.
+    /// Returns `None`, and does nothing, if called from within the closure of a different call of `with` or `look`.
+    /// Apart from `work` the call takes constant time.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
         self.notify_runner();
@@ -58,7 +58,7 @@ impl<'a> AsyncRelay<'a> {
     }
 
     /// Passes the relay to `look`, which reads for example the setpoint. Does not wake the task of the ports. Returns
-    /// `None` inside the `work` or `look` of a call that already has the relay.
+    /// `None` if called from within the closure of a different call of `with` or `look`.
     pub fn look<R>(&self, look: impl FnOnce(&Relay) -> R) -> Option<R> {
         self.lend(|relay| look(relay))
     }
@@ -75,14 +75,14 @@ impl<'a> AsyncRelay<'a> {
         })
     }
 
-    /// Returns the counters of `port`. The upstream and the shared port have the same counters, because no relay has
-    /// both ports.
+    /// Returns the counters of `port`. The upstream and the shared port use the same counters, because a relay has
+    /// either an upstream and a downstream port or a shared port.
     pub fn stats(&self, port: Port) -> SerialStats {
         self.counters(port).get()
     }
 
-    /// Passes the relay to `work` without waking the task of the ports. Returns `None` if a different call already has
-    /// the relay.
+    /// Passes the relay to `work` without waking the task of the ports. Returns `None` if called from within a closure
+    /// that already has the relay.
     pub(super) fn lend<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }

@@ -37,8 +37,8 @@ const ONE: f32 = 2_147_483_648.0;
 /// Number of fractional bits of the fixed-point numbers in which interference samples are summed.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of the samples I / `I_max` for which an estimate is made. With a smaller mean, rounding would
-/// falsify the estimate.
+/// Smallest mean of the samples I / `I_max` for which an estimate is made. With a smaller mean, rounding errors would
+/// make the estimate wrong.
 const LEAST_MEAN: f32 = 1e-6;
 
 /// Estimator of Upsilon, the mean inverse interference power, at one position. It stores sums, not samples.
@@ -128,8 +128,8 @@ impl Estimator {
         self.accepted
     }
 
-    /// Number of rejected samples. A large number means that `I_max` is too small, or that the receiver measures
-    /// nothing.
+    /// Number of rejected samples. A large number means that `I_max` is too small, or that the receiver reports no
+    /// power.
     pub const fn rejected(&self) -> u32 {
         self.rejected
     }
@@ -186,7 +186,7 @@ impl Estimator {
 struct Fit {
     /// Mean m of the accepted samples I / `I_max`.
     m: f32,
-    /// Difference 1 - m, where m is the mean of the samples; computed without loss of digits.
+    /// Difference 1 - m, with the mean m of the samples. Computed from the integer sums, to avoid cancellation.
     rest: f32,
     /// Standard deviation of the accepted samples I / `I_max`.
     s: f32,

@@ -18,8 +18,8 @@
 
 use super::{Field, FieldPoint};
 
-/// Interference field (known interference along x) together with the receiver noise N, W. Upsilon = E[1/I] becomes
-/// Upsilon / (1 + N Upsilon).
+/// Interference field (known interference along x) combined with the power N of the receiver noise, W. With noise,
+/// Upsilon = E[1/I] becomes Upsilon / (1 + N Upsilon).
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(

@@ -9,8 +9,8 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon = E[1/I], 1/W. It corresponds to an interference I of 1e9 W down to 1e-32 W, more than any
-/// receiver measures.
+/// Allowed range of Upsilon = E[1/I], 1/W. The limits correspond to an interference power of 1e9 W and of 1e-32 W. No
+/// receiver can measure so wide a range.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
 /// Point of a [`Field`]: an x, and Upsilon = E[1/I] at this x. Upsilon is the mean of the inverse interference power.
@@ -142,7 +142,7 @@ impl Field {
         self.largest
     }
 
-    /// Returns true if Upsilon = E[1/I] is the same everywhere: the paper's i.i.d. interference.
+    /// Returns true if Upsilon = E[1/I] is the same at every x, as for the paper's i.i.d. interference.
     pub const fn is_constant(&self) -> bool {
         !(self.smallest < self.largest)
     }
@@ -157,8 +157,8 @@ impl Field {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// Returns the two points around `x_m`. If `x_m` is the x of a point, the result is this point and `None`. If `x_m`
-    /// is beyond the table, it is the end point and `None`.
+    /// Returns the two points of the table around `x_m`. If `x_m` is the x of a point, the result is this point and
+    /// `None`. If `x_m` is beyond an end of the table, the result is the point at that end and `None`.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {

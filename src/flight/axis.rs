@@ -87,11 +87,11 @@ impl core::error::Error for AxisError {}
 pub struct Axis {
     sites: Sites,
     middle: Vector,
-    /// Unit vector toward the receiver, at the middle of the line.
+    /// Unit vector from the middle of the line Tx-Rx toward the receiver.
     along: Vector,
-    /// Unit vector to the right, as seen from Tx toward Rx, at the middle of the line.
+    /// Unit vector to the right at the middle of the line Tx-Rx, as seen from Tx toward Rx.
     right: Vector,
-    /// Unit vector upward, at the middle of the line.
+    /// Unit vector upward at the middle of the line Tx-Rx.
     up: Vector,
     /// Half the straight distance from transmitter to receiver, m.
     half_chord_m: f64,
@@ -182,7 +182,7 @@ impl Axis {
         self.distance_m
     }
 
-    /// Returns true if `distance_m` is the line's length, except for rounding.
+    /// Returns true if `distance_m` is the length of the line from Tx to Rx, except for rounding.
     pub fn is_of(&self, distance_m: f32) -> bool {
         let rounded = f64::from(distance_m) * f64::from(f32::EPSILON);
         (f64::from(distance_m) - self.distance_m).abs() <= TOLERANCE_M + rounded
@@ -269,7 +269,8 @@ impl Axis {
         })
     }
 
-    /// Returns the point at height 0 that is `x` m toward Rx from the line's middle and `y` m to the right.
+    /// Returns the point `x` m from the line's middle toward Rx and `y` m to the right, at height 0. Right is meant as
+    /// seen from Tx toward Rx.
     fn on_line(&self, x: f64, y: f64) -> Vector {
         let c = chord(x, self.radius_m);
         let sagitta =
@@ -286,12 +287,13 @@ impl Axis {
         narrow(libm::atan2(east, north))
     }
 
-    /// Returns the angle between the directions of this line and `other`, each at its Tx, rad, 0 to π. Constant work.
+    /// Returns the angle between the directions of this line and `other`, rad, 0 to π. Constant work. Each direction is
+    /// measured at the Tx of its line.
     pub fn turn_rad(&self, other: &Self) -> f32 {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }
 
-    /// Returns the azimuth of the line at `x_m` plus the angle `aside_rad`, wrapped to -π to π, radians. Constant work.
+    /// Returns the azimuth of the line at `x_m` plus `aside_rad`, radians clockwise from north, -π to π. Constant work.
     pub(super) fn heading_rad(&self, x_m: f32, aside_rad: f32) -> f32 {
         turned(self.azimuth_rad(x_m) + aside_rad)
     }
@@ -305,7 +307,7 @@ impl Axis {
         [x * north - y * east, x * east + y * north, -climb].map(narrow)
     }
 
-    /// Returns the north and east components of the line's direction at `x_m`, as a unit vector.
+    /// Returns the north and east components of a unit vector: the line's horizontal direction at `x_m`.
     fn direction(&self, x_m: f32) -> [f64; 2] {
         // The tangent of the line turns with the earth's curvature, by the angle c / r.
         let c = chord(f64::from(x_m) - self.distance_m / 2.0, self.radius_m);
@@ -349,7 +351,7 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns half the length of an arc, m. `chord` is half the length of its chord, and `radius` its radius, m.
+/// Returns half the length of an arc of the radius `radius`, m. `chord` is half the length of the arc's chord, m.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)
@@ -360,8 +362,8 @@ fn chord(arc: f64, radius: f64) -> f64 {
     arc * (1.0 - q * q / 6.0)
 }
 
-/// Minimum length of a line from Tx to Rx, m. Positions have steps of 1e-7 degrees (1 cm), which would turn the
-/// direction of a shorter line by more than 1 mrad.
+/// Minimum length of a line from Tx to Rx, m. Positions have steps of 1e-7 degrees (1 cm). For a shorter line, such a
+/// step would change the line's direction by more than 1 mrad.
 #[doc(hidden)] // for the tests of this workspace
 pub const SHORTEST_M: f64 = 10.0;
 
@@ -410,8 +412,8 @@ impl Vector {
         .unit()
     }
 
-    /// Returns latitude and longitude of this point, radians. The point must be near the ellipsoid, because the
-    /// computation takes a single step of Bowring's method.
+    /// Returns the latitude and longitude of this point, radians. The point must be near the WGS84 ellipsoid, because
+    /// the computation takes only a single step of Bowring's method.
     pub(super) fn latitude_and_longitude(self) -> [f64; 2] {
         let p = libm::sqrt(self.x * self.x + self.y * self.y);
         // b / a. The tangent of the parametric latitude is z / (p b / a).
@@ -467,8 +469,8 @@ impl Vector {
     }
 }
 
-/// Returns the radius of curvature of the WGS84 ellipsoid in the direction `along`, m. `normal` is the ellipsoid's
-/// normal there.
+/// Returns the radius of curvature of the WGS84 ellipsoid at a point, m, in the direction `along`. `normal` is the
+/// ellipsoid's normal at this point.
 pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     let sin2 = normal.z * normal.z;
     let cos2 = 1.0 - sin2;
@@ -487,7 +489,8 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
 /// Factor that converts an angle in units of 10⁻⁷ degrees to radians.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
-/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees, within a unit in the last place.
+/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees. The error is at most one unit in the last place of the
+/// result.
 ///
 /// The angle is reduced to an eighth of a turn in integers, without an error. Sine and cosine of the remaining angle
 /// are computed by fdlibm's series. A general function for f64 would be ten times as large.

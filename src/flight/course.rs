@@ -5,7 +5,7 @@ use super::axis::{Axis, AxisError};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 
-/// Line on earth from Tx to Rx, and the speed limit of a drone that flies along it.
+/// Course of a drone: the line on earth from Tx to Rx, along which it flies, and its speed limit.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
     /// Line on earth from transmitter to receiver.

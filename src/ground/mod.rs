@@ -28,20 +28,21 @@ use crate::wire::message::{Detail, Entry, Hello, Message, Reports};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay after which a different node with the same number is accepted. Relays use `Settings::dead_after`
-/// for this.
+/// Time without a frame of a relay after which a different node with the same number is accepted. Relays use
+/// `Settings::dead_after` instead.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
-/// Time after which an unanswered hello to the polled relay is repeated.
+/// Time after which a hello (status request) to the polled relay is repeated if there was no answer.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Maximum number of relays whose reports are stored: 11 KB in all. 0 without the feature `telemetry`.
+/// Maximum number of relays whose reports are stored; all reports together take 11 KB. 0 without the feature
+/// `telemetry`.
 const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 
-/// Interval between two requests for the reports of all relays. The relays in reach receive them in turn.
+/// Interval in which each relay in radio reach of the station is requested once to report all relays.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
-/// Number of unanswered hellos to one relay after which the next relay is polled.
+/// Number of unanswered hellos (status requests) to one relay after which the next relay is polled.
 const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference.
@@ -84,21 +85,22 @@ pub struct Ground {
     base: u16,
     end: Side,
     node: u16,
-    /// Number of relays in radio reach: one over a wire, up to four over a shared channel.
+    /// Number of relays in direct reach of the station: one over a wire, up to four over a shared channel.
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last query for the relays' mission, repeated in the reply. 0 if none was sent.
+    /// Number of the last query for the relays' mission. A relay repeats the number in its answer. 0 if no query was
+    /// sent.
     query_number: u16,
     flown: Option<FlownMission>,
-    /// Distance of the polled relay, in relays: 1 for the nearest.
+    /// Distance from the station to the polled relay, counted in relays: 1 is the nearest relay.
     distance: u16,
     unanswered: u8,
-    /// Newest mission that the polled relay has stored, by its last hello. `None` before its first hello.
+    /// Newest mission that the polled relay has stored, as reported in its last hello. `None` before its first hello.
     relay_mission: Option<MissionId>,
-    /// True from a hello to the polled relay until that relay's next hello.
+    /// True after the station has sent a hello (status request), until the polled relay sends a hello.
     query_sent: bool,
-    /// Nonce in the polled relay's last hello, repeated by the next mission offer. `None` if no offer is due.
+    /// Number in the polled relay's last hello, to be repeated in the mission offer. `None` if no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
@@ -112,7 +114,7 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Creates a ground station for relays that loaded the mission `base` before flight.
+    /// Creates a ground station for relays that have loaded the mission `base` before flight.
     ///
     /// `end` is the end of the chain at which the station stands: `Upstream` at Tx, `Downstream` at Rx. The epoch
     /// (start counter) in `auth` must be larger at every start.
@@ -184,9 +186,9 @@ impl Ground {
         Ok(())
     }
 
-    /// Ends an upload or a query in progress. Nothing more is offered to the relays.
+    /// Ends an upload or a query in progress. The station offers no mission to the relays after that.
     ///
-    /// A relay that has already stored the mission still offers it to its neighbours.
+    /// A relay that has already stored the mission still offers this mission to its neighbours.
     pub fn cancel(&mut self) {
         self.upload = None;
         self.progress = Progress::Idle;
@@ -206,14 +208,14 @@ impl Ground {
 
     /// Sends the interference measured at this station to the relays in reach.
     ///
-    /// `power_w` is the mean received power with the receiver's noise but without the chain's signals, averaged long
-    /// enough for the relative error of [`Listen`](crate::Listen). One measurement per
+    /// `power_w` is the mean received power, with the receiver's noise but without the signals of transmitter and
+    /// relays. Average long enough for the relative error of [`Listen`](crate::Listen). One measurement per
     /// [`Listen::every`](crate::Listen::every) is enough. Returns false, and does nothing, if `power_w` is outside
     /// 1e-30 to 1e6 W.
     ///
     /// Over a wire one frame of 23 bytes and a tag is sent, on a shared channel one such frame to each of the four
     /// nearest relays. A relay that is absent or has restarted is sent a handshake instead. Reports are not
-    /// acknowledged: the next one replaces a lost one.
+    /// acknowledged: the next report replaces a lost report.
     pub fn measured(&mut self, power_w: f32) -> bool {
         if !is_level(power_w) {
             return false;
@@ -231,8 +233,8 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of intact frames that were rejected. The sender is not in reach or has loaded a different
-    /// mission, or the frame is forged, replayed or malformed.
+    /// Returns the number of intact frames that were rejected. The reasons are a sender out of reach or with a
+    /// different mission, and a frame that is forged, replayed or malformed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -243,14 +245,14 @@ impl Ground {
 
     /// Returns the counters of sent and received frames.
     ///
-    /// `mission` counts frames of relays that loaded a different mission before flight, `foreign` frames of other
-    /// networks, `overheard` frames to other nodes.
+    /// The counter `mission` is for frames of relays that loaded a different mission before flight, `foreign` for
+    /// frames of other networks, and `overheard` for frames addressed to other nodes.
     pub const fn stats(&self) -> &Stats {
         &self.stats
     }
 
-    /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay has proven
-    /// that it has the key.
+    /// Returns the node numbers of the relays in direct reach, nearest first. The second value is true if the relay has
+    /// proven that it has the key.
     ///
     /// After a new handshake, the value is false until the relay answers. Work: four relays at most.
     pub fn relays_in_reach(&self) -> impl Iterator<Item = (u16, bool)> {
@@ -258,7 +260,8 @@ impl Ground {
         nodes.map(|node| (node, self.endpoint.knows(node)))
     }
 
-    /// Processes received bytes, in pieces of any length. Work: at most one tag check per 19 bytes.
+    /// Processes received bytes, in pieces of any length. Work: at most one check of an authentication tag per 19
+    /// bytes.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             if let Some(decoded) = self.deframer.push(byte)
@@ -326,9 +329,9 @@ impl Ground {
         self.upload.is_none() && self.repeat_at.is_some()
     }
 
-    /// Returns true if `upload` answers the query for the relays' mission.
+    /// Returns true if `upload`, received in a relay's offer, answers the station's query for the mission.
     ///
-    /// `answer` is the number in the relay's offer, which must be the number of the query.
+    /// `answer` is the number repeated in the offer. It must be the number of the query.
     fn answers_query(&self, upload: &Upload, answer: u16) -> bool {
         self.is_querying() && answer == self.query_number && upload.base() == self.base
     }
@@ -347,7 +350,7 @@ impl Ground {
     }
 
     /// Handles a hello of relay `by`, `distance` relays away, that answers the query for the mission. If the relay has
-    /// stored an uploaded mission, its next message contains this mission.
+    /// stored an uploaded mission, it sends this mission in a following message.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
@@ -547,8 +550,8 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Writes the interference report to the next relay; `None` if none is pending. If that relay cannot verify frames
-    /// of this station yet, a handshake is written in place of the report.
+    /// Writes the interference report to the next relay; `None` if no report is pending. If the relay cannot verify
+    /// frames of this station yet, a handshake is written instead of the report.
     fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {
@@ -601,20 +604,20 @@ impl Ground {
 struct Watching {
     /// Number of relays in the mission.
     all: u16,
-    /// Number of nearest relays that may be asked: one over a wire, up to eight over a shared channel.
+    /// Number of nearest relays to send requests to: one over a wire, up to eight over a shared channel.
     reach: u16,
-    /// Bit mask of the relays of which any frame was received since the last request to them.
+    /// Bit mask of relays that have sent a frame to any node since the last request to the relay.
     overheard: u8,
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
-    /// Distance of the relay to which the last request goes, in relays; 0 without a request. `is_due` is true until the
-    /// request is sent.
+    /// Distance of the relay to which the newest request goes, in relays; 0 before the first request. `is_due` is true
+    /// until the request is sent.
     distance: u16,
     is_due: bool,
-    /// Bit mask of the relays received since the last request to them.
+    /// Bit mask of relays that have sent a message to this station since the last request to the relay.
     heard: u8,
-    /// Report entries received since the last call of [`apply`](Self::apply), which gets the time.
+    /// Report entries received since the last call of [`apply`](Self::apply). That call sets their arrival time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
     /// Newest known state of every relay that has reported, in the order of the node numbers.
     known: heapless::Vec<KnownState, REPORTED>,
@@ -629,11 +632,11 @@ struct KnownState {
 }
 
 impl Watching {
-    /// Creates the state of a station that requests no reports.
+    /// Creates the initial state: the station requests no reports.
     ///
-    /// The request numbers begin at 1024 times `epoch`, so that they rise from start to start. After a run of more than
-    /// 85 minutes, the numbers of the next run can be smaller. Relays then ignore requests until 60 s after the last
-    /// request of the earlier run.
+    /// The request numbers begin at 1024 times `epoch` (start counter of the station), so that they rise from start to
+    /// start. If the station ran for more than 85 minutes, the numbers after its next start can be smaller. Relays then
+    /// ignore requests until 60 s after the last request before that start.
     #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
     fn new(epoch: u32, all: u16, wiring: Wiring) -> Self {
         let most = match wiring {
@@ -654,10 +657,10 @@ impl Watching {
         }
     }
 
-    /// Schedules a request for reports, if due, to the next relay. The farthest comes first. Relays at distances above 4
-    /// are left out before the first report, and if no frame of them was received since the last request.
+    /// Schedules a request for reports, if due, to the next relay. The farthest relay comes first. A relay at a
+    /// distance above 4 is left out before the first report, and if it has sent no frame since the last request to it.
     ///
-    /// Returns true if that relay has sent no message since the last request to it.
+    /// Returns true if the scheduled relay has sent no message to this station since the last request to it.
     fn request(&mut self, now: Instant, node: u64) -> bool {
         if self.repeat_at.is_none_or(|at| at > now) {
             return false;
@@ -687,8 +690,7 @@ impl Watching {
         is_silent
     }
 
-    /// Schedules the request for reports to the relay at `distance` again. That relay could not verify an earlier
-    /// request.
+    /// Schedules another request for reports to the relay at `distance`. The relay could not verify an earlier request.
     const fn answer(&mut self, distance: u16) {
         if self.repeat_at.is_some() && !self.is_due {
             self.distance = distance;
@@ -750,10 +752,10 @@ pub struct FlownMission {
     pub by: u16,
     /// Version of the mission; 0 for the mission that was loaded before flight.
     pub version: u16,
-    /// True if the relay flies the mission now; false if it has only stored it.
+    /// True if the relay flies the mission now, false if it has stored the mission without flying it.
     pub flies: bool,
     /// Uploaded mission with all its parameters. `None` for the mission loaded before flight, and until the relay has
-    /// sent the upload. Older firmware never sends it.
+    /// sent the uploaded mission. A relay with older firmware never sends it.
     pub upload: Option<Upload>,
 }
 
@@ -791,18 +793,18 @@ pub enum Progress {
         by: u16,
         /// Latest view known to the reporting relay.
         view: ViewId,
-        /// Number of relays that fly the mission. Counted are the relay `by`, and the relays of its view that are
-        /// farther from the station.
+        /// Number of relays that fly the mission. Counted are relay `by`, and those relays of its view that are farther
+        /// from the station.
         relays: u16,
     },
     /// A relay refuses the mission, so the chain does not fly it. The mission contradicts the Tx and Rx positions, or
-    /// that relay's geofence.
+    /// the geofence or settings of the relay that refuses it.
     Refused {
-        /// Node number of the relay that reports the refusal. The mission is refused by this relay, or by one farther
-        /// from the station.
+        /// Node number of the relay that reports the refusal. The mission is refused by this relay, or by a relay
+        /// farther from the station.
         by: u16,
     },
-    /// A relay has stored a newer mission, or a different mission with the upload's version.
+    /// A relay has stored a newer mission than the upload, or a different mission with the same version.
     Outdated {
         /// Version of the mission that the relay has stored.
         version: u16,

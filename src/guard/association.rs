@@ -12,19 +12,18 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer such
-/// messages are possibly late messages of an earlier session.
+/// Number of consecutive messages of an unknown session that prove a restart of the neighbour. Fewer such messages are
+/// possibly late messages of an earlier association (session).
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of seconds after which a neighbour's halt request expires if it is not repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Number of seconds after which a neighbour's last reported x expires, if no new message arrives.
+/// Number of seconds after which a neighbour's last reported x expires without a new message.
 const SEEN_REMINDERS: u8 = 15;
 
-/// Notice that tells a neighbour that this relay has left the association (session) with it. The relay leaves it
-/// because its drone no longer flies to the setpoints. The notice is repeated until the neighbour starts a new
-/// association.
+/// Notice to a neighbour that this relay has left the association (session) with it. This relay leaves the association
+/// because its drone no longer flies to setpoints. The notice is repeated until the neighbour starts a new association.
 #[derive(Clone, Copy, Debug)]
 struct LeaveNotice {
     own_number: u16,
@@ -46,9 +45,9 @@ pub(super) struct Association {
     pub(super) own_number: u16,
     /// Number by which the neighbour identifies this association (session); 0 until it is known.
     pub(super) peer_number: u16,
-    /// Number of consecutive messages that belong to another association (session) of the neighbour.
+    /// Number of consecutive messages of the neighbour that belong to no current association (session).
     foreign_messages: u8,
-    /// True if a message to the neighbour about the minimum separation must be sent.
+    /// True if a message about the fence (limit of x between two relays) to the neighbour is due.
     pub(super) due: bool,
     /// True while the neighbour requests an open chain. In an open chain all relays are at least the minimum separation
     /// apart along x.
@@ -60,8 +59,8 @@ pub(super) struct Association {
     halt_reminders_left: u8,
     /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
-    /// Number of the association (session) that the neighbour has left, 0 for none. The neighbour then counts as
-    /// absent: its drone does not fly to setpoints.
+    /// Number of the association (session) that the neighbour has left; 0 if it has left none. A neighbour that has
+    /// left counts as absent, because its drone does not fly to setpoints.
     left_number: u16,
     /// Notice to the neighbour that this relay has left an association (session) with it. `None` if the neighbour
     /// needs no notice.
@@ -104,9 +103,8 @@ impl Association {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance, m, by which this relay is on the correct side of its neighbour along x. The neighbour is
-    /// at `side`. The neighbour's last received x counts. The result is negative on the wrong side, and NaN if a
-    /// position is unknown.
+    /// Returns this relay's distance from the neighbour at `side` along x, m, negative in the wrong order. The distance
+    /// is computed from the last reported x of both. NaN if one of them is unknown, or the neighbour's has expired.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -125,14 +123,14 @@ impl Association {
         }
     }
 
-    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The difference must
-    /// exceed the sum of the errors of both reports.
+    /// Returns true if the last reported x of this relay and of the neighbour are in the wrong order. They must differ
+    /// by more than the sum of the errors of both reports.
     pub(super) fn is_on_wrong_side(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
-    /// Returns true if this relay's reported x is on the correct side of the neighbour's last x. The difference must
-    /// be at least the sum of the errors of both reports.
+    /// Returns true if the last reported x of this relay and of the neighbour are in the right order. They must differ
+    /// by at least the sum of the errors of both reports.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -154,14 +152,14 @@ impl Association {
         self.left_number = 0;
     }
 
-    /// Returns true if `fence` states that the neighbour has left the current association (session). A repetition of
-    /// this message does not count, because the next association has another number.
+    /// Returns true if the message `fence` states that the neighbour has left the current association. Later
+    /// repetitions of the message do not count, because this relay then has a new association (session).
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
 
-    /// Returns a new association (session) in place of the old one, which this relay has left. If the neighbour has
-    /// sent its number for the old association, it still relies on the old association. The new association then
+    /// Returns a new association (session) with the same neighbour, after this relay has left `self`. If the neighbour
+    /// has sent its number for the association `self`, it still relies on that association. The new association then
     /// includes a leave notice.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
@@ -187,8 +185,9 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to a left association (session). This relay or its neighbour has left it. If
-    /// this relay has left the association, its leave notice is repeated, until the neighbour starts a new association.
+    /// Returns true if the message `fence` belongs to an association (session) that was left. This relay or its
+    /// neighbour has left it. If the neighbour still uses an association that this relay has left, the leave notice is
+    /// repeated.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -233,8 +232,8 @@ impl Association {
         known
     }
 
-    /// Returns a message of this association (session) about the fence, a limit of x between two relays. The
-    /// message's fence number, x and distance are 0, for the caller to fill in.
+    /// Returns a message to the neighbour about the fence (limit of x between the two relays). The caller fills in the
+    /// fence's number, its x, and the distance to keep before it, which are 0 in the result.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own_number,
@@ -251,9 +250,9 @@ impl Association {
         }
     }
 
-    /// Stores the neighbour's request for an open chain, or its end, from a message of this association. In an open
-    /// chain all relays are at least the minimum separation apart along x. A reply must be sent if the message shows
-    /// that the neighbour has not received this relay's last request.
+    /// Records if the neighbour's message `fence` requests an open chain. In an open chain all relays are at least the
+    /// minimum separation apart along x. A reply is due if the message shows that the neighbour has not received this
+    /// relay's own last request or its withdrawal.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.open_requested = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
@@ -266,9 +265,9 @@ impl Association {
         self.open_sent = opens;
     }
 
-    /// Stores the halt request in the neighbour's message. A message without a request ends an earlier request, but
-    /// only if the message has a valid position (`is_placed`). Reason: a rebooted neighbour has no valid position
-    /// yet, and does not know its earlier request.
+    /// Records if the neighbour's message `fence` requests a halt. A message without a request ends an earlier one, but
+    /// only if its position is valid (`is_placed`). A rebooted neighbour has no valid position at first, and does not
+    /// know its earlier request.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -302,8 +301,8 @@ impl Association {
     /// Returns the pending message of a relay that does not fly to setpoints or has just started. `None` if there is
     /// none.
     ///
-    /// The message contains the relay's position, and a halt request to forward. The message is valid without an
-    /// association (session).
+    /// The message contains the relay's reported position, and a halt request if one must be forwarded. The message is
+    /// valid without an association (session).
     pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.leave_notice.is_none();
         let place = own.reported.filter(|_| is_due)?;
@@ -328,15 +327,15 @@ impl Association {
 /// does not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
-    /// is lost.
+    /// Nearest lost node on this side, and the limit of this relay's x due to all lost nodes, m. `None` if no node is
+    /// lost.
     lost: Option<(u16, f32)>,
     /// Number of the nearest lost node whose x was known, and the limit of x because of it, m. 0 without such a node.
     known: (u16, f32),
-    /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if no lost relay is near.
-    /// Until this relay is at this x, perhaps only lateral offset and altitude keep the two apart.
+    /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if it is no closer now.
+    /// Before this x, possibly only lateral offset and altitude keep this relay apart from the lost relay.
     near_m: f32,
-    /// True if a lost relay was last reported on the wrong side of this relay along x.
+    /// True while a lost relay may be on the wrong side of this relay along x.
     disordered: bool,
     /// Node number and last reported position of a neighbour whose drone does not fly to setpoints. `None` without
     /// such a neighbour.
@@ -389,9 +388,9 @@ impl KeepOut {
             }
     }
 
-    /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Nodes beyond `node`
-    /// are no obstacles for this relay, because `node` is between them and this relay. The obstacles are lost relays,
-    /// or drones that do not fly to setpoints.
+    /// Removes obstacles on `side` after a message from `node`: this node, and nodes farther away. Those are no
+    /// obstacles, because `node` is between them and this relay. An obstacle is a lost relay, or a drone that does not
+    /// fly to setpoints.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -408,9 +407,8 @@ impl KeepOut {
         }
     }
 
-    /// Stores the position of a neighbour that reports that its drone does not fly to setpoints. A report with the
-    /// number of the current association (session) is ignored. Such a report is late, because the drone flies to
-    /// setpoints again.
+    /// Stores the position of a neighbour that reports that its drone does not fly to setpoints. A report that belongs
+    /// to the current association (session) is ignored: it is late, because the drone flies to setpoints again.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.peer_number;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
@@ -423,8 +421,8 @@ impl KeepOut {
         self.unflown = None;
     }
 
-    /// Returns the obstacles that remain when the line from Tx to Rx changes: lost relays. A drone that does not fly
-    /// to setpoints is dropped, because its x along the new line is unknown.
+    /// Returns the obstacles to keep when the line from Tx to Rx changes: the lost relays. A drone that does not fly to
+    /// setpoints is not kept, because its x along the new line is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
@@ -449,16 +447,15 @@ impl KeepOut {
         }
     }
 
-    /// Returns true if a drone that does not fly to setpoints blocks the path to the agreed position.
+    /// Returns true if a drone not flying to setpoints blocks the path from setpoint to agreed position.
     pub(super) fn blocks(&self, own: &Own) -> bool {
         let ways = own.setpoint.zip(own.target);
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
-    /// Returns the last position on the path from `from` to `to` that keeps the separation from a drone. This drone
-    /// does not fly to setpoints. If `from` is closer than the separation, the path comes no nearer to the drone.
-    /// Along x the path ends before the drone, unless lateral offset and altitude separate the two. If the two are
-    /// within the separation along x, only moves to the side, up or down are possible, and only away from the drone.
+    /// Returns the last permitted position on the path `from` to `to`, near a drone without setpoints. Along x the path
+    /// ends at the separation from the drone, or at `from` if that is closer, unless lateral offset and altitude
+    /// separate the two. Within the separation along x, a move across x must lead away from the drone.
     pub(super) fn path_end(
         &self,
         from: Placement,
@@ -487,9 +484,10 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits this relay's x to `x_m`, the x of its first setpoint. Reason: some relays were never received.
+    /// Sets the limit due to lost relays on this side to `x_m`, the x of this relay's first setpoint.
     ///
-    /// These relays may hover anywhere beyond `x_m`. At x = `near_m` this relay has the separation from all of them.
+    /// No effect without a lost relay. The lost relays may hover anywhere beyond `x_m`. At x = `near_m` this relay has
+    /// the separation from all of them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -497,25 +495,25 @@ impl KeepOut {
         }
     }
 
-    /// Records that the relay lost last may be closer than the minimum separation. This ends when this relay is at x
-    /// = `near_m`.
+    /// Records that the most recently lost relay may be closer than the minimum separation. The record ends when this
+    /// relay is at x = `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
-    /// Returns the x, m, at which this relay will be the minimum separation away from the relay lost last. NaN if
-    /// this relay is already so far away.
+    /// Returns the x, m, at which this relay is the minimum separation away from the last lost relay. NaN if this relay
+    /// is already so far away.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
 
-    /// Returns true while the relay lost last may be closer than the minimum separation.
+    /// Returns true while the most recently lost relay may be closer than the minimum separation.
     pub(super) const fn is_near(&self) -> bool {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay is far enough from the lost relay. This relay has the minimum
-    /// separation at x = `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
+    /// Ends the state [`is_near`](Self::is_near) once this relay is far enough from the lost relay. This is so at x =
+    /// `near_m`. `is_beyond` returns true if this relay is at or past the x in its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -543,9 +541,9 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Adds an obstacle for the relays at `side`, none of which has ever sent a message to this relay. They may hover
-    /// anywhere beyond the plane x = `limit_m`. This relay keeps at least `separation_m` away from that plane, until
-    /// one of these relays sends a message.
+    /// Adds an obstacle for the relays at `side`, none of which has ever sent a message to this relay. These relays may
+    /// hover anywhere beyond the plane x = `limit_m`. This relay keeps at least `separation_m` away from that plane,
+    /// until one of the relays sends a message.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),
@@ -564,21 +562,21 @@ impl KeepOut {
 pub struct Fence {
     /// Number that the sender gave to its association (session) with this neighbour, never 0.
     pub association: u16,
-    /// Echo of the association (session) number that the destination sent last, 0 for none.
+    /// Number that the destination last sent for its association (session) with the sender, 0 for none.
     pub echo: u16,
     /// Number of the fence, the plane x = constant between the two relays; 0 if there is no fence yet. The relay
     /// upstream (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
     pub number: u16,
-    /// Limit of x that the sender states, m, -1e7 to 1e7. The relay toward Tx sends the x of the fence, or its
-    /// highest possible x while it has set no fence. The relay toward Rx sends its lowest possible x.
+    /// Limit of x that the sender states, m, -1e7 to 1e7. The relay toward Tx states the x of its newest fence, or its
+    /// own highest possible x before the first fence. The relay toward Rx states its lowest possible x.
     pub x_m: f32,
     /// x of the position that the chain has agreed on for the sender, m: -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, this is the lateral offset and altitude of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the upstream relay requests to stay before the fence, m, 0 to 1e5. If the distance is
-    /// below the minimum separation, the downstream relay must not change its lateral offset or altitude.
+    /// Distance along x that the upstream relay wants to keep before the fence, m, 0 to 1e5. While it is below the
+    /// minimum separation, the downstream relay must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -589,23 +587,23 @@ impl Fence {
     pub const ARRIVED: u8 = 1;
     /// Flag of the downstream relay: it agrees to the distance `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
-    /// Flag: request to open the chain: neighbours at least the minimum separation apart along x. The sender, or a
-    /// relay beyond the sender, needs the open chain to change its lateral offset or altitude.
+    /// Flag: request to open the chain, so that all relays are at least the separation apart along x. The sender, or a
+    /// relay farther away, needs the open chain to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
     /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies the flag `REQUESTS_OPENING`
     /// of the last message received from the destination to this flag.
     pub const OPENING_RECEIVED: u8 = 8;
     /// Flag: the sender has left this association (session). The sender's drone does not fly to its setpoints, or did
-    /// not for a time. Positions and the number of the fence are not valid.
+    /// not do so for a time. The fence number is not valid, and the position only together with
+    /// [`UNPLACED`](Self::UNPLACED).
     pub const LEFT: u8 = 16;
-    /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond the
-    /// sender, is on the wrong side of a neighbour along x, or does not know its order. The request is repeated every
-    /// second, and is valid in any association (session).
+    /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay farther away,
+    /// is on the wrong side of a neighbour along x, or does not know its order with a neighbour. The request is
+    /// repeated every second, and is valid in any association (session).
     pub const HALTS: u8 = 32;
-    /// Flag: the position in this message only shows the order of the two relays along x. The position does not
-    /// permit the neighbour to move. The relay downstream sets the flag while its order with its own downstream
-    /// neighbour is not confirmed. With [`LEFT`](Self::LEFT): the sender does not fly to setpoints, and `x_m` is its
-    /// last reported x.
+    /// Flag: the position in this message shows the order of the two relays along x, but permits no move. The relay
+    /// downstream sets the flag while its order with its own downstream neighbour is not confirmed. With
+    /// [`LEFT`](Self::LEFT): the sender does not fly to setpoints, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
     pub(super) const fn without_position(association: u16, echo: u16) -> Self {
@@ -642,16 +640,16 @@ impl Fence {
 pub enum HoldReason {
     /// Messages have not confirmed yet that this relay and the neighbour are in order along x.
     Unheard,
-    /// The neighbour is on the wrong side along x, or so close that the order is unknown. Neither relay moves.
+    /// The neighbour is on the wrong side of this relay along x, or too close to know. Neither relay moves.
     Order,
     /// The agreed positions of this relay and the neighbour are too close. Neither their x nor their lateral offsets
     /// and altitudes separate them.
     Close,
     /// A lost relay may still hover between this relay and its agreed position.
     Lost,
-    /// The neighbour's drone does not fly to setpoints, and is in the way or does not make room.
+    /// The neighbour's drone does not fly to setpoints. It is in the way, or does not move out of the way.
     NotFlown,
-    /// The setpoint has not moved for at least five seconds, because the neighbour has not made room.
+    /// The setpoint has not moved for at least five seconds: the neighbour has not moved out of the way.
     Pending,
     /// The chain halts, because a relay is, or may be, on the wrong side of a neighbour.
     Halted,

@@ -8,7 +8,7 @@ use crate::time::Duration;
 /// Default of [`GuardConfig::lag`]: the stopping time at the autopilot link's default speed limit.
 const LAG: Duration = Duration::from_millis(9_800);
 
-/// Maximum distance from the geofence at which a relay may start, m in each coordinate.
+/// Maximum distance from the geofence at which a relay may start, m: the same for x, y and altitude.
 pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 
 /// Geofence: box in which all setpoints must be. The x axis is the line from Tx to Rx.
@@ -42,7 +42,8 @@ impl Geofence {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
-    /// Geofence of the setpoints. A relay that starts outside flies into it. From then on all its setpoints are inside.
+    /// Geofence of the setpoints. A relay that starts outside of the geofence flies into it. Once inside, all its
+    /// setpoints are inside.
     pub geofence: Geofence,
     /// Minimum distance between relays, m: 0 to 1e5. The same at all relays.
     pub separation_m: f32,
@@ -50,7 +51,7 @@ pub struct GuardConfig {
     pub relays: u16,
     /// Maximum position error of a hovering relay, m per coordinate: 0 to 1e3.
     ///
-    /// Two relays can be closer than `separation_m` by twice this error.
+    /// Because of this error, two relays can come up to twice `hover_m` closer to each other than `separation_m`.
     pub hover_m: f32,
     /// Maximum time from `Guard::steer` until the drone flies toward the new setpoint.
     ///
@@ -65,7 +66,7 @@ impl GuardConfig {
     /// The band is extended to the profile's altitude.
     ///
     /// If relays leave the line Tx-Rx while they have no quorum ([`Settings::without_quorum`](crate::Settings)), the
-    /// geofence needs [room](Self::with_room_for) for these positions, because it limits all setpoints.
+    /// geofence must be [enlarged](Self::with_room_for) for their positions, because it limits all setpoints.
     ///
     /// `hover_m` is 0 and `lag` is 9.8 s, the [stopping time](crate::flight::autopilot::carrot::Pace::stopping_time) of
     /// the default pace.
@@ -97,8 +98,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns this configuration with a larger geofence, for relays that leave the line Tx-Rx. With
-    /// [`WithoutQuorum::Leave`] they do so while they have no quorum.
+    /// Returns this configuration with a geofence enlarged for relays that leave the line Tx-Rx. With
+    /// [`WithoutQuorum::Leave`] relays leave the line while they have no quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.geofence;
@@ -140,8 +141,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the position nearest to `place` that is no farther outside the geofence than `before`. If `before` is
-    /// inside the geofence, so is the result.
+    /// Returns the position nearest to `place` that is no farther outside of the geofence than `before`. This applies
+    /// to each coordinate. If `before` is inside the geofence, so is the result.
     pub(super) fn clamp_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.geofence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
@@ -170,8 +171,8 @@ impl GuardConfig {
 
     /// Returns the x to which relay `node` flies while the chain is open, m. `x_m` is its agreed x.
     ///
-    /// In an open chain all relays keep their order and are at least the minimum separation apart along x. For this,
-    /// all relays of the mission must fit into the geofence.
+    /// In an open chain all relays keep their order and are at least the minimum separation apart along x. This
+    /// requires that the geofence is long enough for all relays of the mission.
     #[inline(never)] // called from several places
     pub(super) fn open_chain_x(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.geofence.least_x_m;
@@ -183,14 +184,15 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.geofence.most_x_m)
     }
 
-    /// Returns the least difference in x that keeps two relays the minimum separation apart, m. `one` and `other` are
-    /// their lateral offsets and altitudes. The result is 0 if these alone keep the relays apart.
+    /// Returns the smallest difference in x that keeps two relays the minimum separation apart, m. `one` and `other`
+    /// are the lateral offset and altitude of each relay. The result is 0 if these differences alone keep the relays
+    /// apart.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a coordinate in the geofence, m: four units in the last place.
+    /// Returns the maximum rounding error of an x in the geofence, m: `4.0 * f32::EPSILON * |x|`.
     pub(super) fn rounding(&self) -> f32 {
         let fence = &self.geofence;
         4.0 * f32::EPSILON * fence.most_x_m.abs().max(fence.least_x_m.abs())

@@ -11,14 +11,15 @@ use crate::time::Jitter;
 /// one, modulo 2^16, is above 0 and below this limit.
 const AHEAD: u16 = 0x8000;
 
-/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The upstream neighbour sets it.
+/// State of the fence toward Tx: the plane x = constant that is a lower limit of this relay's x. The upstream neighbour
+/// sets it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
     /// Number of the newest fence from the upstream neighbour; 0 if there is none yet.
     number: u16,
-    /// x of the upstream neighbour's newest fence, m. This relay's x stays above it.
+    /// x of the upstream neighbour's newest fence, m. This relay's x stays at or above it.
     fence_m: f32,
     /// Distance along x that the upstream neighbour wants to keep before its fence, m. Infinite until it requests one.
     requested_m: f32,
@@ -29,9 +30,9 @@ pub(super) struct FenceFollower {
     target_m: f32,
     /// Lateral offset and altitude of the upstream neighbour's setpoint.
     across: CrossSection,
-    /// True once this relay's x is known to be above a fence of the upstream neighbour.
+    /// True once this relay's x is known to have reached a fence (lower limit) of the upstream neighbour.
     clear: bool,
-    /// True once the upstream neighbour knows that this relay's x is above the newest fence.
+    /// True once the upstream neighbour has been told that this relay's x has reached the newest fence.
     owner_informed: bool,
 }
 
@@ -60,8 +61,9 @@ impl FenceFollower {
         self.association.node = node;
     }
 
-    /// Starts a new association (session) with the upstream neighbour. The previous neighbour's limit of x remains in
-    /// `keep_out`. If that neighbour was never received, the limit is this relay's position.
+    /// Starts a new association (session) with the upstream neighbour. `keep_out` keeps the limit that the previous
+    /// neighbour set to this relay's x. If that neighbour has set no fence, the limit is the x of this relay's
+    /// setpoint.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -87,8 +89,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to setpoints, so no limit
-    /// of x applies to it.
+    /// Leaves the association (session) with the upstream neighbour, and schedules a notice to it. This relay's drone
+    /// no longer flies to setpoints, so no limit of x applies to it.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -97,8 +99,8 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays remain obstacles, but drones that do
-    /// not fly to setpoints do not.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays are kept as obstacles. Drones that
+    /// do not fly to setpoints are not kept.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -107,8 +109,8 @@ impl FenceFollower {
         };
     }
 
-    /// Handles the notice that the upstream neighbour no longer flies to setpoints. This relay comes no nearer to it.
-    /// If the two were in the wrong order along x, this relay holds its position.
+    /// Handles the notice that the upstream neighbour no longer flies to setpoints. This relay comes no nearer to that
+    /// neighbour. If the two were in the wrong order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -188,23 +190,23 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Returns true if the upstream side permits a change of lateral offset and altitude.
+    /// Returns true if the upstream side permits this relay to change its lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the upstream neighbour requests less than the minimum separation along x. This relay must then
-    /// not change its lateral offset or altitude.
+    /// Returns true if the upstream neighbour requests a distance along x below the minimum separation. This relay must
+    /// then not change its lateral offset or altitude.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true while this relay and its upstream neighbour may be as close as at the start.
+    /// Returns true while this relay and its upstream neighbour may still be as close as they started.
     ///
-    /// They may be closer than the separation. The neighbour has announced a fence (limit of x), but this relay is not
-    /// known to be beyond it yet.
+    /// They may be closer than the minimum separation. The neighbour has announced a fence (limit of x), but this relay
+    /// is not known to have been beyond it.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
@@ -214,9 +216,9 @@ impl FenceFollower {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the upstream neighbour requests, if it is large enough. Together with
-    /// `downstream_m`, the distance to the downstream neighbour, it must be at least the separation. This keeps the two
-    /// neighbours apart.
+    /// Agrees to the distance along x that the upstream neighbour requests, if it is large enough. The sum of this
+    /// distance and `downstream_m`, the distance to the downstream neighbour, must be at least the separation. Then the
+    /// upstream and the downstream neighbour are the separation apart.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -225,8 +227,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the least possible distance along x to the upstream neighbour, m. Infinity stands for the minimum
-    /// separation. 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
+    /// Returns the distance along x that is guaranteed to the upstream neighbour, m. Infinity stands for the minimum
+    /// separation. The result is 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
@@ -235,11 +237,11 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if this relay is known to be beyond its upstream neighbour along x. Also true if the neighbour does
-    /// not fly to setpoints, or if the chain ends here.
+    /// Returns true if this relay is known to be at a larger x than its upstream neighbour. Also true if the neighbour
+    /// does not fly to setpoints, or if the chain ends here.
     ///
-    /// A fence (limit of x) of the neighbour shows the order: the neighbour announces one only after it has found this
-    /// relay at a larger x. False while a lost relay may be on the wrong side.
+    /// A fence (limit of x) of the neighbour shows the order: the neighbour announces a fence only after it has found
+    /// this relay at a larger x than its own. False while a lost relay may be on the wrong side of this relay.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.has_fence())
@@ -258,8 +260,9 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Records that this relay is beyond the newest fence (limit of x), if its known position shows this. A message to
-    /// the upstream neighbour is then due. `low_m` is the lowest x of this relay and of the relays downstream, m.
+    /// Records that this relay has reached the newest fence (limit of x), if its reachable x show this. If `low_m`
+    /// shows this, too, a message to the upstream neighbour is due. `low_m` is the lowest x of this relay and of the
+    /// relays downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -267,10 +270,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest possible x of the relays upstream during the start, m.
+    /// Returns the highest x that the relays upstream may still take after this relay's start, m.
     ///
-    /// Until this relay is beyond the first fence (limit of x), these relays may be closer than the separation. After
-    /// that they are all at a smaller x than this relay, and the result is negative infinity.
+    /// Until this relay is beyond the first fence (limit of x), the relays upstream may be closer than the separation.
+    /// After that they are all at a smaller x than this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.has_fence() && !self.clear {
             self.fence_m - self.requested_m.min(own.config.separation_m)
@@ -279,9 +282,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the upstream neighbour, with `low_m` as its x, m. `None` if none is pending. If
-    /// `placed` is false, the order of this relay and its downstream neighbour is not confirmed. The message is then
-    /// only sent to request a halt.
+    /// Returns the pending message to the upstream neighbour; `None` if none is pending. Its x is `low_m`, m. If
+    /// `placed` is false, the order of this relay and its downstream neighbour is not confirmed. A message is then only
+    /// sent to request a halt, with this relay's own lowest x.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

@@ -125,10 +125,10 @@ pub struct Guard {
     flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
-    /// True while this relay requests a halt of the chain.
+    /// True while this relay itself requests a halt of the chain.
     ///
-    /// The reason is a neighbour on the wrong side, or several seconds (reminders) in a row with an unknown order along
-    /// x.
+    /// The reason is a neighbour on the wrong side of this relay along x, or an order along x that has been unknown for
+    /// several seconds (reminders) in a row.
     disorder: bool,
     /// Number of seconds (reminders) in a row in which the order along x was unknown.
     unordered: u8,
@@ -136,7 +136,7 @@ pub struct Guard {
     refused: u32,
 }
 
-/// Number of seconds between two messages of a relay that neither flies to setpoints nor moves.
+/// Number of seconds between two messages of a relay that stays in place without flying to setpoints.
 const UNFLOWN_EVERY: u8 = 4;
 
 /// Number of seconds after which an unknown order along x halts the chain.
@@ -200,11 +200,11 @@ impl Guard {
         }
     }
 
-    /// Records whether the relay flies to its setpoints from `now` on (`flown`). Returns true if this is a change.
-    /// Initially true.
+    /// Records in `flown` if the drone flies to the relay's setpoints from `now` on; initially true. Returns true if
+    /// `flown` has changed.
     ///
-    /// While it is false there is no setpoint, and both neighbours are informed that the relay may be anywhere. When it
-    /// becomes true again, the relay begins as after a start, with the next reported position.
+    /// While `flown` is false there is no setpoint, and both neighbours are informed that the relay may be anywhere.
+    /// When it becomes true again, the relay begins as after a start, with the next reported position.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
         if flown == self.flown {
             return false;
@@ -221,11 +221,11 @@ impl Guard {
         true
     }
 
-    /// Restarts the guard because the line from Tx to Rx has changed. Earlier positions and messages are void.
+    /// Restarts the guard because the line from Tx to Rx has changed. Earlier positions and messages no longer count.
     ///
-    /// The relay begins with the first position reported after `now`, once the drone has stopped. With `None`, it
-    /// begins with the first position after the start. As after a start, lost relays may hover anywhere on their side
-    /// of this relay.
+    /// The first setpoint is a position measured after `now` and the stopping time of the drone. If `now` is `None`, it
+    /// is the next position measured after the guard's start. As after a start, a lost relay toward Tx may hover at any
+    /// smaller x than this relay, and a lost relay toward Rx at any larger x.
     pub fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(now) = now {
             self.started_at = self.started_at.max(now + self.own.config.lag);
@@ -244,16 +244,16 @@ impl Guard {
         self.own.config.geofence = fence;
     }
 
-    /// Records that relay `node` has the order to leave the chain, 0 for none. The fences beside it then leave it no
-    /// more room than its own position needs.
+    /// Records that relay `node` has the order to leave the chain; 0 for none. The fences (limits of x) next to that
+    /// relay then leave to it only the room that it needs to hold its position.
     pub const fn set_leaver(&mut self, node: u16) {
         self.own.leaver = node;
     }
 
     /// Handles a message about a fence (limit of x) from node `from`, a neighbour at `side`.
     ///
-    /// A message out of range is counted and ignored. A message of an earlier association (session) or of another node
-    /// is ignored.
+    /// A message with a value out of range is counted and ignored. A message of an earlier association (session), or of
+    /// a node other than the neighbour, is ignored.
     pub fn handle_fence(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);
@@ -270,11 +270,11 @@ impl Guard {
         }
     }
 
-    /// Sets the neighbour at `side`; `None` at the end of the chain. No effect if it is the current neighbour.
+    /// Sets the neighbour at `side`; `None` at the end of the chain. No effect if `neighbour` is already set.
     ///
     /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget) is called. A
-    /// message of the previous neighbour, or of a node between the two, has the same effect once that node is the
-    /// neighbour.
+    /// message of the previous neighbour, or of a node between the two relays, also ends this once the sender is the
+    /// new neighbour.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -288,10 +288,10 @@ impl Guard {
         }
     }
 
-    /// Removes the obstacles of lost relays at `side`, which have landed or were removed.
+    /// Removes the obstacles of lost relays at `side`. The lost relays have landed or were removed.
     ///
-    /// `others` is true if the chain has more relays at that side. If none of them has been received, this relay keeps
-    /// clear of everything beyond its present x until it receives one.
+    /// `others` is true if the chain has more relays on this side. If no message of these has been received, this relay
+    /// keeps clear of everything beyond its present x until it receives one of them.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         let (is_heard, limit_m, keep_out) = match side {
@@ -311,8 +311,8 @@ impl Guard {
     /// Moves the setpoint as far as the neighbours permit, and returns it. `None` until there is an agreed position and
     /// a reported position of the drone.
     ///
-    /// `now` is the time at which the autopilot gets the setpoint. The drone flies toward it within
-    /// [`GuardConfig::lag`].
+    /// `now` is the time at which the autopilot gets the setpoint. At most [`GuardConfig::lag`] later, the drone flies
+    /// toward it.
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.own.target?;
         let Some(before) = self.own.setpoint else {
@@ -383,9 +383,9 @@ impl Guard {
             .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. A neighbour's
-    /// request is forwarded to the other neighbour. `clear` is true if nothing forbids this relay to change its lateral
-    /// offset and altitude.
+    /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. A request of one
+    /// neighbour is forwarded to the other neighbour. `clear` is true if both sides permit this relay to change its
+    /// lateral offset and altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let is_blocked = !clear && !own.has_agreed_cross_section();
@@ -401,14 +401,15 @@ impl Guard {
         down.forward_open(downward);
     }
 
-    /// Returns true if this relay is known to be between its two neighbours along x, as it should be.
+    /// Returns true if this relay is known to be between its two neighbours along x, the right order.
     fn is_ordered(&self) -> bool {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
     /// Returns true if this relay and its neighbours are known to be in the wrong order along x.
     ///
-    /// Either a neighbour is on the wrong side of this relay, or the upstream neighbour is beyond the downstream one.
+    /// Either a neighbour is on the wrong side of this relay, or the upstream neighbour is at a larger x than the
+    /// downstream one.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -416,7 +417,7 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if fences or reported positions show that this relay is between its neighbours.
+    /// Returns true if fences or reported positions show the relay between its neighbours along x.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);
@@ -424,8 +425,8 @@ impl Guard {
             && (self.owner.is_ordered(own) || seen(&self.owner.association, Side::Downstream))
     }
 
-    /// Halts this relay while its order along x is not known (`is_ordered` is false), or on request. The request comes
-    /// from another relay, or from this relay on the wrong side of a neighbour.
+    /// Halts this relay while its order along x is unknown (`is_ordered` is false), or on a halt request. Such a
+    /// request comes from another relay, or from this relay if a neighbour is on its wrong side.
     fn halt(&mut self, is_ordered: bool, now: Instant) {
         self.disorder &= !is_ordered && !self.is_seen_in_order();
         self.disorder |= self.is_out_of_order();
@@ -514,8 +515,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position, and a report has shown the relay there. The agreed position
-    /// is limited to the geofence.
+    /// Returns true if a position report has shown the relay at its agreed position. The setpoint must be the agreed
+    /// position, limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
@@ -530,26 +531,26 @@ impl Guard {
         }
     }
 
-    /// Returns true if the neighbour downstream has answered the newest fence (limit of x), or cannot.
+    /// Returns true if the downstream neighbour has answered the newest fence (limit of x). Also true if it cannot
+    /// answer: before its first message, and if it does not fly to setpoints.
     pub fn is_answered(&self) -> bool {
         self.owner.is_answered()
     }
 
-    /// Returns true if the drone's position at the first setpoint will be known at once: it hovers. Also true in manual
-    /// control, in which it cannot begin.
+    /// Returns true if the drone hovers, so that the first setpoint can be set at a known position. Also true if there
+    /// is a setpoint, or if the drone does not fly to setpoints.
     pub fn may_begin(&self, now: Instant) -> bool {
         !self.flown || self.own.setpoint.is_some() || self.own.hovers(now)
     }
 
-    /// Returns true if the relay hovers at its setpoint, which a report has shown. The setpoint can be short of the agreed
-    /// position. Also true in manual control, and without any report.
+    /// Returns true if a position report has shown the relay at its setpoint, where it hovers. The setpoint can differ
+    /// from the agreed position. Also true if the drone does not fly to setpoints, and before any report.
     pub fn is_still(&self) -> bool {
         let hovers = self.own.reachable.has_arrived() && self.own.arrived;
         hovers || !self.flown || self.own.reported.is_none()
     }
 
-    /// Returns the reason on the given side that keeps this relay from its agreed position. `None` without such a
-    /// reason, or without an agreed position.
+    /// Returns the reason on the side `side` that keeps this relay from its agreed position.
     ///
     /// `None` without such a reason, or without an agreed position. Shortly after a new agreement the reason may still
     /// refer to the previous positions. While the drone does not fly to setpoints, only [`HoldReason::Order`] is
@@ -595,8 +596,8 @@ impl Guard {
         }
     }
 
-    /// Returns the reason why a move toward `side` has waited for five seconds; `None` if none has. It is `NotFlown` if
-    /// the neighbour does not fly to setpoints, otherwise `Pending`.
+    /// Returns the reason why the setpoint has not moved toward `side` for five seconds, if it should. The reason is
+    /// `NotFlown` if the neighbour does not fly to setpoints, otherwise `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {

@@ -31,8 +31,8 @@ impl Span {
     }
 }
 
-/// Interval of x in which this relay can be, m. It contains the last reported x and the setpoints to which the relay
-/// possibly still flies.
+/// Interval of x in which this relay can be, m. It contains the last reported x, and all setpoints that the drone may
+/// still be flying to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
     pub(super) setpoint_m: f32,
@@ -47,8 +47,8 @@ pub(super) struct ReachableInterval {
     /// position report.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report was measured late enough to show the effect of the first setpoint. Also true if the
-    /// drone hovered before it.
+    /// True once a position report is recent enough to show that the drone follows its first setpoint. Also true if the
+    /// drone hovered before the first setpoint.
     pub(super) known: bool,
 }
 
@@ -58,8 +58,8 @@ impl ReachableInterval {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval after the first setpoint, at `x_m`. It counts as unknown until a report shows the effect of
-    /// this setpoint, because the relay possibly still flies to an earlier one.
+    /// Returns the interval after the first setpoint, at `x_m`. The interval counts as unknown until a position report
+    /// shows the effect of this setpoint, because the drone possibly still flies somewhere else.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             setpoint_m: x_m,
@@ -85,8 +85,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Extends the interval by the new setpoint `x_m`. The relay possibly first continues toward the previous setpoint,
-    /// and then turns.
+    /// Extends the interval by the new setpoint `x_m`. The drone possibly flies on toward the previous setpoint before
+    /// it turns to the new one.
     pub(super) fn extend_to(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.setpoint_m).abs() > 0.0 {
             self.setpoint_m = x_m;
@@ -96,8 +96,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Updates the interval by a position report of time `at`. The relay is between the reported x and its recent
-    /// setpoints.
+    /// Updates the interval by a position report measured at time `at`. Afterwards it contains the reported x, and the
+    /// x of all setpoints that the drone may still be flying to.
     pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
         let hovers = (x_m - self.setpoint_m).abs() <= config.hover_m + config.rounding();
         let here = Span::at(if hovers { self.setpoint_m } else { x_m });
@@ -128,17 +128,17 @@ impl ReachableInterval {
     }
 }
 
-/// Time between two position reports from which the drone does not count as hovering.
+/// Maximum time between two position reports for which the drone counts as hovering.
 const HOVER_REPORTS: Duration = Duration::from_millis(2_500);
 
-/// Number of seconds after which a setpoint that has not moved counts as held up.
+/// Number of seconds without a move of the setpoint after which the relay counts as held up.
 const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Own {
     pub(super) config: GuardConfig,
     pub(super) node: u16,
-    /// Relay with the order to leave, which holds its position; 0 for none.
+    /// Number of the relay with the order to leave the chain, 0 for none. That relay holds its position.
     pub(super) leaver: u16,
     /// Agreed position, inside the geofence; `None` before the first agreement.
     pub(super) target: Option<Placement>,
@@ -158,9 +158,9 @@ pub(super) struct Own {
     pub(super) sent_place: Placement,
     /// Number of reminders (seconds) since the last change of the setpoint.
     reminders: u8,
-    /// Last setpoint at which this relay arrived, or its first setpoint. If the relay halts on its way from this
-    /// setpoint, it stops no farther outside the geofence than this setpoint. Before the first setpoint: the position
-    /// at which the drone hovers.
+    /// Last setpoint at which this relay has arrived, or its first setpoint. A relay that halts on its way stops no
+    /// farther outside of the geofence than this position. Before the first setpoint: the position at which the drone
+    /// hovers.
     last_arrival: Placement,
 }
 
@@ -195,10 +195,10 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the position from which the relay's next path starts.
+    /// Returns the position from which the relay's next path starts: `setpoint` once it has arrived there.
     ///
-    /// It is `setpoint` once the relay has arrived there. Before, its x is the reported x, moved toward the x of
-    /// `setpoint` by at most the error of the report.
+    /// Before its arrival, the x is the reported x, moved toward the x of `setpoint` by at most the error of the
+    /// report.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -215,10 +215,10 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for five seconds, and `side` can be the cause.
+    /// Returns true if the setpoint has not moved for five seconds, possibly because of one neighbour.
     ///
-    /// It can be if the agreed position is farther toward `side`. It also can be if this side forbids a change of
-    /// lateral offset or altitude (`clear` is false).
+    /// The neighbour at `side` can be the cause if the agreed position is farther toward `side`. It also can be the
+    /// cause if its side forbids a needed change of lateral offset or altitude (`clear` is false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -272,7 +272,7 @@ impl Own {
         self.set_setpoint(place, now);
     }
 
-    /// Handles a position report of time `at` before the first setpoint: equal positions are a hover.
+    /// Handles a position report of time `at` before the first setpoint. A drone that reports equal positions hovers.
     pub(super) fn report_hover(&mut self, at: Instant, place: Placement) {
         let stays = self.is_at(place, self.last_arrival);
         if !(stays && at < self.reachable.reported_at + HOVER_REPORTS) {
@@ -282,7 +282,8 @@ impl Own {
         self.reachable.reported_at = at;
     }
 
-    /// Returns true if the drone has hovered for the [`lag`](GuardConfig::lag) before its first setpoint.
+    /// Returns true if the drone has hovered at least for the time [`lag`](GuardConfig::lag). Used before the first
+    /// setpoint.
     pub(super) fn hovers(&self, now: Instant) -> bool {
         let ReachableInterval {
             reported_at,
@@ -292,8 +293,8 @@ impl Own {
         reported_at >= changed_at + self.config.lag && now < reported_at + HOVER_REPORTS
     }
 
-    /// Handles a position report, measured at time `at`. The relay has arrived at its lateral offset and altitude if
-    /// `at` is long enough after their last change.
+    /// Handles a position report, measured at time `at`. It can show that the relay has arrived at its lateral offset
+    /// and altitude. For this, `at` must be at least the lag after the last change of these two.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.arrived |= at >= self.cross_section_changed_at + self.config.lag
             && self.is_near(place.cross_section(), self.cross_section());

@@ -8,19 +8,20 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Rx, a plane x = constant that the downstream neighbour stays beyond. This relay sets it.
+/// State of the fence toward Rx: a plane x = constant, the downstream neighbour's lower limit of x. This relay sets the
+/// fence.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
     /// Number of the newest fence sent to the downstream neighbour; 0 if none was sent.
     number: u16,
-    /// x of the newest fence sent, m; infinite if there is none. The downstream neighbour's x stays above it.
+    /// x of the newest fence sent, m; infinite if there is none. The downstream neighbour's x stays at or above it.
     fence_m: f32,
     /// Distance along x that this relay wants to keep before its fence, m; infinite until it requests one.
     requested_m: f32,
-    /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed distance, or a larger
-    /// one requested later. Infinity stands for the minimum separation.
+    /// Distance along x to keep now to the downstream neighbour, m. Infinity stands for the minimum separation. The
+    /// value is the agreed distance, or a larger distance that this relay has requested after the agreement.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m. Negative infinity before its first message.
     follower_low_m: f32,
@@ -32,7 +33,7 @@ pub(super) struct FenceOwner {
     arrived: bool,
     /// True if the downstream neighbour has received the newest fence.
     is_acknowledged: bool,
-    /// True once the downstream neighbour has reported that its x is above a fence.
+    /// True once the downstream neighbour has reported that its x has reached a fence.
     clear: bool,
 }
 
@@ -63,8 +64,9 @@ impl FenceOwner {
         self.association.node = node;
     }
 
-    /// Starts a new association (session) with the downstream neighbour. The previous neighbour's limit of x remains in
-    /// `keep_out`. If that neighbour was never received, the limit is this relay's position.
+    /// Starts a new association (session) with the downstream neighbour. `keep_out` keeps the limit that the previous
+    /// neighbour set to this relay's x. If that neighbour is not known to be at a larger x, the limit is the x of this
+    /// relay's setpoint.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -83,8 +85,8 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to setpoints, so no limit
-    /// of x applies to it.
+    /// Leaves the association (session) with the downstream neighbour, and schedules a notice to it. This relay's drone
+    /// no longer flies to setpoints, so no limit of x applies to it.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -93,8 +95,8 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays remain obstacles, but drones that do
-    /// not fly to setpoints do not.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays are kept as obstacles. Drones that
+    /// do not fly to setpoints are not kept.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -103,8 +105,8 @@ impl FenceOwner {
         };
     }
 
-    /// Handles the notice that the downstream neighbour no longer flies to setpoints. This relay comes no nearer to it.
-    /// If the two were in the wrong order along x, this relay holds its position.
+    /// Handles the notice that the downstream neighbour no longer flies to setpoints. This relay comes no nearer to
+    /// that neighbour. If the two were in the wrong order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -149,8 +151,8 @@ impl FenceOwner {
     /// relays can be closer along x than these errors. They then count as in order only if lateral offset and altitude
     /// keep them at least the separation apart.
     ///
-    /// After that the neighbour counts as in order even if the reports show the wrong order by up to twice the error.
-    /// Relays in order can move by the error when one of them halts or restarts.
+    /// Once the neighbour is beyond the first fence, it counts as in order even if the reports show the wrong order by
+    /// up to four times `hover_m`. Relays in order can move by the error when one of them halts or restarts.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
@@ -175,15 +177,16 @@ impl FenceOwner {
     }
 
     /// Returns the distance along x that this relay keeps from the downstream neighbour, m. `kept_m` is the distance to
-    /// the upstream neighbour, m. Both together are at least the minimum separation, so that the two neighbours keep
-    /// it, too.
+    /// the upstream neighbour, m. The sum of the two distances is at least the minimum separation, so that the two
+    /// neighbours are at least the separation apart.
     pub(super) fn step(&self, own: &Own, kept_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
-    /// Returns the least possible distance along x to the downstream neighbour, m. It is 0 near a lost relay, and until
-    /// the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the upstream neighbour, m.
+    /// Returns the distance along x that is guaranteed to the downstream neighbour, m. The result is 0 near a lost
+    /// relay, and until the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the upstream
+    /// neighbour, m.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -195,8 +198,8 @@ impl FenceOwner {
 
     /// Returns true if the distance to the downstream neighbour may be less than the minimum separation.
     ///
-    /// A smaller distance along x is requested or agreed to. The neighbour must then not change its lateral offset or
-    /// altitude, because perhaps only these keep the two apart.
+    /// This relay has requested a smaller distance along x, or the neighbour has agreed to one. The neighbour must then
+    /// not change its lateral offset or altitude, because perhaps only these keep the two relays apart.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
@@ -260,8 +263,7 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the largest x at which this relay keeps the distance `apart` from its neighbour, m. The neighbour is
-    /// downstream, and the distance is along x, m.
+    /// Returns the largest x at which this relay is `apart` metres before its downstream neighbour, m.
     #[inline(never)] // called from several places
     pub(super) fn max_x(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
@@ -275,17 +277,17 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Returns true if the downstream side permits a change of lateral offset and altitude.
+    /// Returns true if the downstream side permits this relay to change its lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true while this relay and its downstream neighbour may be as close as at the start.
+    /// Returns true while this relay and its downstream neighbour may still be as close as they started.
     ///
-    /// They may be closer than the separation. The neighbour has answered, but has not reported yet that it is beyond a
-    /// fence (limit of x).
+    /// They may be closer than the minimum separation. The neighbour has answered, but has not reported yet that it has
+    /// reached a fence (its lower limit of x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
@@ -297,12 +299,13 @@ impl FenceOwner {
         place.is_some_and(|place| own.is_close(place.x_m - own.target_m()))
     }
 
-    /// Returns true if the downstream neighbour is known to be beyond the newest fence.
+    /// Returns true if the downstream neighbour is known to be beyond the newest fence (limit of x).
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns true if the downstream neighbour has answered the newest fence (limit of x), or cannot.
+    /// Returns true if the downstream neighbour has answered the newest fence (limit of x). Also true if it cannot
+    /// answer: before its first message, and if it does not fly to setpoints.
     pub(super) fn is_answered(&self) -> bool {
         let cannot = !self.has_reply() || self.association.has_no_flown_neighbour();
         cannot || self.is_acknowledged && !self.association.due
@@ -310,8 +313,8 @@ impl FenceOwner {
 
     /// Returns the smallest permitted distance along x between this relay and its downstream neighbour, m.
     ///
-    /// It is usually the minimum separation. It is less if the agreed positions of the two relays are closer along x.
-    /// Both must have arrived at their agreed lateral offsets and altitudes, which then keep the relays apart.
+    /// The result is usually the minimum separation. It is smaller if the agreed positions of the two relays are closer
+    /// along x, and both relays have arrived at their agreed lateral offsets and altitudes, which then keep them apart.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -327,12 +330,12 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the next fence for the downstream neighbour: its x (m), a distance (m) and a flag. `None` if the
-    /// neighbour is not known to be beyond this relay.
+    /// Returns the next fence for the downstream neighbour: x (m), a distance (m), and true for a final x. `None` if
+    /// the neighbour is not known to be at a larger x than this relay.
     ///
-    /// The neighbour stays beyond the fence, and this relay stays the distance before it. The flag is true if the x is
-    /// final, and false if the fence can come nearer once relays have moved. `kept_m` is the distance to the upstream
-    /// neighbour, m. `upstream_m` is the highest possible x of the relays upstream, m.
+    /// The neighbour's x stays at or above the fence, and this relay stays the distance before the fence. If x is not
+    /// final, the fence can come nearer once relays have moved. `kept_m` is the distance to the upstream neighbour, m.
+    /// `upstream_m` is the highest possible x of the relays upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -364,7 +367,7 @@ impl FenceOwner {
     }
 
     /// Schedules a message if the fence (limit of x) for the downstream neighbour must move. If the new x is final, the
-    /// message is sent at once. If the fence can come nearer once this relay has moved, it waits for the next reminder.
+    /// message is due at once. Otherwise it is due after this relay's arrival, because the fence can then come nearer.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
         if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
             let stays = last || own.reachable.has_arrived();
@@ -379,8 +382,8 @@ impl FenceOwner {
 
     /// Returns the pending fence message to the downstream neighbour; `None` if none is pending.
     ///
-    /// If `moves` is true, the message may contain a new fence with the next number. Otherwise it repeats the last
-    /// fence. Only this function numbers fences, so that every numbered fence is sent.
+    /// If `moves` is true, the message may contain a new fence with the next number. Otherwise the message repeats the
+    /// last fence. Only this function gives a fence its number, so that every fence with a number is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

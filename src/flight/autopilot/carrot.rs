@@ -17,7 +17,7 @@ use crate::time::{Duration, Instant};
 /// Maximum distance to the setpoint at which the moving target counts as arrived, m.
 const ARRIVED_M: f32 = 0.01;
 
-/// Ratio k of the moving target's speed to its distance from the setpoint, near the setpoint, 1/s.
+/// Ratio k of speed to remaining distance, 1/s, with which the moving target approaches the setpoint.
 const END_PER_S: f32 = 0.5;
 
 /// Minimum speed of the moving target near the setpoint, m/s.
@@ -27,35 +27,36 @@ const END_SPEED_M_S: f32 = 0.2;
 /// the target by 1.25 d m/s.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// Maximum speed of the moving target, as a fraction of the speed limit. The rest is a margin, because at times a drone
-/// flies faster than its target.
+/// Maximum speed of the moving target, as a fraction of the drone's speed limit. The difference is a margin, because a
+/// drone at times flies faster than its target.
 const CARROT_PART: f32 = 0.96;
 
 /// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the difference
-/// of maximum speed and present speed.
+/// between the maximum speed and the present speed.
 ///
-/// The target approaches its maximum speed smoothly, because a drone does not stop accelerating at once.
+/// The moving target thus approaches its maximum speed smoothly, because a drone does not stop accelerating at once.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum speed of the moving target as a fraction of the speed limit, while the drone lags behind.
+/// Lower bound of the moving target's maximum speed, as a fraction of the speed limit. The target flies at this speed
+/// while the drone is far behind it.
 const LEAST_PART: f32 = 0.1;
 
-/// Factor on the acceleration limit for velocity that does not lead toward a new setpoint.
+/// Factor on the acceleration limit, for velocity across the direction to a new setpoint.
 ///
-/// When the setpoint changes, the moving target still has its old velocity. The component toward the new setpoint
-/// stays. Any other component is reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`].
-/// The target does not turn at once, because the drone would then overshoot it and come back.
+/// When the setpoint changes, the moving target still has its old velocity. Its component toward the new setpoint
+/// stays. All other velocity is reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`].
+/// An instant turn of the target would make the drone overshoot it and come back.
 const TURN_PART: f32 = 2.0;
 
-/// Remaining distance of the moving target at which a stop counts as complete, m. The drone lags behind and then has up
-/// to 0.5 m left.
+/// Remaining distance of the moving target to the setpoint at which a stop counts as complete, m. The drone, which is
+/// behind the target, then has up to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
 /// Assumed time from a new setpoint until the drone reacts, ms. This time includes 200 ms for the transmission to the
 /// flight controller, and 1000 ms for the delay of the drone's motion.
 const BEHIND_MS: u64 = 1_200;
 
-/// Half-life of the moving target's speed as it approaches the setpoint, ms: ln 2 / k with k = 0.5 /s.
+/// Time in which the moving target's speed halves near the setpoint, ms: ln 2 / k, with k = 0.5 /s.
 ///
 /// Near the setpoint the speed is k times the remaining distance.
 const HALVES_MS: u64 = 1_387;
@@ -185,8 +186,8 @@ impl Carrot {
         self.is_standing
     }
 
-    /// Returns the position of the moving target at the time `ago` before its last step. The position is extrapolated
-    /// with the target's velocity.
+    /// Returns the moving target's position at the time `ago` before its last step. The target's present velocity is
+    /// assumed for the whole time `ago`.
     fn place_before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -197,7 +198,8 @@ impl Carrot {
         }
     }
 
-    /// Returns the position at which the target stops if it decelerates now, but never beyond `setpoint`.
+    /// Returns the position at which the moving target stops if it decelerates from now on. The position is on the way
+    /// to `setpoint`, at most `setpoint` itself.
     pub(super) fn stop(&self, setpoint: Placement, pace: Pace) -> Placement {
         let to = self.way_to(setpoint);
         let left = length(to);
@@ -304,19 +306,20 @@ fn length(a: [f32; 3]) -> f32 {
 
 /// Interval at which the position of a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
-/// Interval at which a standing target is repeated to a PX4. A PX4 leaves OFFBOARD after a second without a target.
+/// Interval at which a target that stands still is sent again to a PX4. A PX4 leaves OFFBOARD after a second without a
+/// target.
 const STANDING: Duration = Duration::from_millis(200);
 
-/// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
+/// Interval at which a standing target is sent again to an ArduCopter that has not reported it yet. More frequent
 /// repetition makes an ArduCopter wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Number of consecutive reports of a different target after which the sent target counts as refused. An ArduCopter
-/// reports its target twice a second.
+/// Number of consecutive reports of a different target after which the sent target counts as refused. A different
+/// target is one other than the sent target. An ArduCopter reports its target twice a second.
 const REFUSED_AFTER: u8 = 6;
-/// Age of the autopilot's last report of its target at which its target counts as unknown, s.
+/// Time after the last report of a different target at which a refusal ends, in units of 2^20 µs.
 const UNKNOWN_AFTER_S: u32 = 10;
-/// Minimum time for which a target must have been sent before it can count as refused.
+/// Minimum time for which targets must have been sent before the autopilot can count as refusing them.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
 /// Maximum difference between a standing target and the target reported by an ArduCopter, 1e-7 degrees.
@@ -326,7 +329,7 @@ const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
 
-/// Number of times that a standing target is repeated to an autopilot that never reports its target.
+/// Maximum number of transmissions of a standing target to an ArduCopter that never reports a target.
 const UNCONFIRMED: u8 = 10;
 
 /// Target that is sent to the autopilot, with its schedule and the autopilot's confirmation of it.
@@ -334,15 +337,15 @@ const UNCONFIRMED: u8 = 10;
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// Number of transmissions of this target while it stands still.
+    /// Number of transmissions to an ArduCopter since the target stands still; 0 while the target moves.
     times_sent: u8,
     /// True once the autopilot has reported this target.
     is_accepted: bool,
     /// Start of the time in which targets have been sent without a break.
     since: Instant,
-    /// Number of consecutive reports in which the autopilot's target is not the sent one.
+    /// Number of consecutive reports by the autopilot of a target other than the sent one.
     other_targets: u8,
-    /// Time of the autopilot's last report of a target other than the sent one, s.
+    /// Time of the autopilot's last report of a target other than the sent one, in units of 2^20 µs.
     compared_s: u32,
     /// True once the autopilot has reported a target position in POSITION_TARGET_GLOBAL_INT.
     is_reported: bool,
@@ -370,11 +373,10 @@ impl Target {
         self.is_accepted = false;
     }
 
-    /// Compares the autopilot's reported target with the sent target. Returns true once when the two count as
-    /// different: the target has been sent for [`SENT_FOR`], and [`REFUSED_AFTER`] reports in a row contained a
-    /// different target.
+    /// Compares the autopilot's reported target with the sent target. Returns true once for each refusal: targets have
+    /// been sent for [`SENT_FOR`], and after that [`REFUSED_AFTER`] reports in a row contained a different target.
     ///
-    /// A larger difference is allowed for a moving target, because the report shows an earlier position of it.
+    /// A larger difference is allowed for a moving target, because the report shows where the target was some time ago.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
         self.is_reported = true;
         let Some(point) = axis.point(self.carrot.place) else {
@@ -411,14 +413,15 @@ impl Target {
         before < REFUSED_AFTER && self.is_refused(now)
     }
 
-    /// Returns true while the autopilot reports a target other than the sent one. False after some seconds without a
-    /// report.
+    /// Returns true while the autopilot refuses the sent target: it reports a different one. False once the last such
+    /// report is [`UNKNOWN_AFTER_S`] old.
     pub(super) const fn is_refused(self, now: Instant) -> bool {
         self.other_targets >= REFUSED_AFTER
             && whole_s(now).wrapping_sub(self.compared_s) < UNKNOWN_AFTER_S
     }
 
-    /// Schedules the next target after the drone's own position was sent to a PX4 in the state `Standby`.
+    /// Schedules the next target after the drone's own position has been sent to a PX4 as the target. This is done in
+    /// the state `Standby`, before the relay controls the drone.
     ///
     /// A PX4 accepts the mode OFFBOARD only while it receives targets.
     pub(super) fn on_own_place_sent(&mut self, now: Instant) {
@@ -551,8 +554,8 @@ mod tests {
         }
     }
 
-    /// Checks that the moving target stops gently when the setpoint is withdrawn at any time. The target never stops
-    /// beyond the setpoint.
+    /// Checks that the moving target stops without a jerk when the setpoint is withdrawn, at any time. The target
+    /// decelerates by less than 0.23 m/s in 0.1 s, and never stops beyond the setpoint.
     #[test]
     fn a_withdrawn_carrot_stops_gently_anywhere() {
         let to = Placement::on_line(60.0, 20.0);
@@ -593,10 +596,10 @@ mod tests {
         Axis::between(sites).unwrap()
     }
 
-    /// Returns how many reports of a moving target in 20 s count as reports of a different target.
+    /// Returns the number of refusals that [`Target::compare`] reports for a moving target within 20 s.
     ///
-    /// The autopilot reports twice a second. Each report has the position that was sent `lag` times 100 ms earlier,
-    /// moved sideways by `aside_m`.
+    /// The autopilot reports its target twice a second. Each report contains the position that was sent `lag` times 100
+    /// ms earlier, moved `aside_m` metres sideways.
     fn other_targets(lag: usize, aside_m: f32) -> usize {
         let axis = axis();
         let to = Placement::on_line(900.0, 20.0);

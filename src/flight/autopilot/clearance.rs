@@ -30,8 +30,8 @@ const DENIED: u8 = 2;
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
-    /// True if more relays are lost on this side than a command can name. In this case no command can report them as
-    /// landed.
+    /// True if more relays are lost on this side than one command can contain ([`MOST`]). In this case no command can
+    /// report the relays of this side as landed.
     is_full: bool,
 }
 
@@ -40,12 +40,12 @@ struct LostSide {
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// Last accepted command: its sender, and the numbers of the landed relays. `None` before the first one. A
+    /// Last accepted command: its sender, and the numbers of the landed relays. `None` before the first command. A
     /// repetition of the last command is answered and has no other effect.
     accepted: Option<(Address, RelayNumbers)>,
     /// Unsent answer to a command: addressee and `MAV_RESULT`; `None` if there is none.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays have landed. `None` if there is none, and once the relay has been informed.
+    /// Side whose lost relays have landed, for the relay. `None` if no side is pending.
     cleared: Option<Side>,
 }
 
@@ -57,7 +57,7 @@ impl Clearance {
         }
     }
 
-    /// Updates the lost relays by an event of the relay.
+    /// Adds a relay that `event` reports as lost or as leaving, or removes a relay that is received again.
     pub(super) fn handle_event(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { side, node } | Event::MayLeaveTold { side, node } => {
@@ -74,7 +74,7 @@ impl Clearance {
     }
 
     /// Processes the operator's command that reports lost relays as landed. Returns the event for the firmware. `from`
-    /// is the sender, and `parameters` are the numbers of the relays.
+    /// is the sender of the command, and `parameters` are the numbers of the landed relays.
     pub(super) fn command(
         &mut self,
         from: Address,
@@ -103,7 +103,7 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true until a received command is answered, and this relay knows the landed relays.
+    /// Returns true while a command is unanswered, or the relay has not been informed of the landed relays.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }
@@ -120,7 +120,7 @@ impl Clearance {
 }
 
 impl LostSide {
-    /// Returns true if the numbers `named` are exactly those of this side's lost relays, at least one.
+    /// Returns true if `named` contains all lost relays of this side, at least one, and no other relay.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);

@@ -43,20 +43,21 @@ const OVERDUE: Duration = Duration::from_millis(600);
 
 /// Duration of regular position messages after which the state [`State::Blind`] (position lost) ends.
 const RECOVERY: Duration = Duration::from_millis(1_000);
-/// Time used instead of [`RECOVERY`] after two losses of the position within [`SHORT_TIME`].
+/// Duration used instead of [`RECOVERY`] if the position is lost twice within [`SHORT_TIME`].
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
-/// Maximum time between two losses of the position at which [`LONG_RECOVERY`] applies.
+/// Maximum time from one loss of the position to the next for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
 /// Maximum time from an ArduCopter's mode change to its report of the geofence breach that caused it.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason why the relay cannot control the drone must last before it is reported.
+/// Minimum time for which a reason must have kept the relay from control before the reason is reported.
 const SETTLED: Duration = Duration::from_millis(1_000);
-/// Minimum time between two reports of reasons why the relay cannot control the drone.
+/// Minimum time between two reports why the relay cannot control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which the guard must hold the drone back before the reason is reported to the operator.
+/// Time for which the guard must hold the drone back before the reason is reported to the operator. The guard avoids
+/// collisions.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
@@ -85,30 +86,32 @@ pub struct Autopilot {
     /// Side of the neighbour to which a directional antenna points; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
     target: Option<Target>,
-    /// Position at which the moving target stops after a withdrawal of the setpoint. `None` while there is a setpoint.
+    /// Position at which the moving target stops after the setpoint has been withdrawn. `None` while there is a
+    /// setpoint.
     stop: Option<Placement>,
     /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never did.
     blind_at: Option<Instant>,
-    /// Start of the time in which positions are received again in [`State::Blind`]; `None` otherwise.
+    /// Time since which position messages arrive again in the state [`State::Blind`] (position lost). `None` in all
+    /// other states, and while no position arrives.
     located_at: Option<Instant>,
-    /// Duration of regular positions after which the present state [`State::Blind`] ends.
+    /// Time for which positions must arrive regularly before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Loss of control over the drone that is still to be reported, and the time of the report. `None` if there is
+    /// Loss of control over the drone that has not been reported yet, and the time of its report. `None` if there is
     /// none.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and the time since which it holds. `None` if
-    /// the pilot can give control.
+    /// Reason why the pilot cannot give the relay control of the drone, and the time of its last change. `None` if the
+    /// pilot can give control.
     wait: (Option<WaitReason>, Instant),
-    /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if nothing
-    /// has been reported. The inner `None` means that the pilot can give control.
+    /// Last report why the pilot cannot give the relay control, and its time; `None` if never reported. The inner
+    /// `None` stands for the report that the pilot can give control.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the firmware reports that the relay is ready to control the drone.
     ready: bool,
     /// Reported reasons why the guard (collision avoidance) holds the drone back. The first entry is the reason due to
     /// the upstream neighbour, the second the reason due to the downstream neighbour.
     hold: [Option<HoldReason>; 2],
-    /// Newest reasons why the guard holds the drone back, and the time of their last change. The order is that of
-    /// `hold`.
+    /// Newest reasons why the guard holds the drone back, and the time of their last change. The order of the two sides
+    /// is that of `hold`.
     newest_hold: ([Option<HoldReason>; 2], Instant),
     /// True from the acceptance of a new view (list of relays) until its relays have agreed on positions.
     is_new_view: bool,
@@ -264,11 +267,11 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Sets the line from Tx to Rx, when a mission changes these positions. Call it when `Relay::sites` has changed,
-    /// before the next [`handle_setpoint`](Self::handle_setpoint).
+    /// Sets the line from Tx to Rx after a mission has changed the position of Tx or Rx. Call it when `Relay::sites`
+    /// has changed, before the next [`handle_setpoint`](Self::handle_setpoint).
     ///
-    /// The drone holds its position until the next setpoint, because the present one belongs to the previous line. A
-    /// call with the present line has no effect. Constant work.
+    /// The drone holds its position until the next setpoint, because the present setpoint belongs to the previous line.
+    /// A call with an unchanged line has no effect. Constant work.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
         let now = self.clock.advance(now);
         if axis == self.axis {
@@ -315,7 +318,7 @@ impl Autopilot {
 
     /// Sets the side of the neighbour to which a directional antenna points. The antenna is mounted facing forward.
     ///
-    /// With `None` the targets have no heading.
+    /// With `None` no heading is sent to the autopilot.
     ///
     /// If a side is set, [`exchange`](Self::exchange) calls [`handle_bearing`](Self::handle_bearing) with
     /// [`Relay::bearing`].
@@ -340,7 +343,7 @@ impl Autopilot {
     }
 
     /// Records whether the relay is ready to control the drone; initially true. While the relay is not ready, a PX4 in
-    /// [`State::Standby`] receives no targets, so that the PX4 refuses OFFBOARD.
+    /// [`State::Standby`] receives no targets, so that the PX4 refuses the mode OFFBOARD.
     ///
     /// Nothing else changes: a drone that the relay controls stays under control, and an ArduCopter accepts GUIDED in
     /// any case.
@@ -360,9 +363,8 @@ impl Autopilot {
 
     /// Reports to the operator why the guard (collision avoidance) holds the relay back, for each side.
     ///
-    /// A reason is sent while the relay controls the drone or in [`State::Standby`], once it has lasted for 3 s.
-    /// Shorter holds are normal while the relays agree on new positions. The time between two equal lines is at least
-    /// 10 s.
+    /// A reason is sent while the relay controls the drone or in [`State::Standby`], once the reason has lasted for 3
+    /// s. Shorter holds are normal while the relays agree on new positions. The same text is sent at most once in 10 s.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
         if self.newest_hold.0 != reasons {
@@ -384,17 +386,17 @@ impl Autopilot {
         }
     }
 
-    /// Queues a text of at most 50 bytes for the operator. Returns true if there was room. At most three texts can
-    /// wait. The time between two equal texts is at least 10 s.
+    /// Queues a text of at most 50 bytes for the operator. Returns true if the queue had room for it, or already
+    /// contained it. The queue holds three texts. The same text is sent at most once in 10 s.
     pub fn send_text(&mut self, text: &str) -> bool {
         self.report.queue_text(text)
     }
 
     /// Processes an event of the relay, and sends the operator a text about events that matter in flight.
     ///
-    /// A new view (list of relays) is such an event once its positions are agreed on. In addition, the relay must
-    /// control the drone, and the guard must not hold the drone back. [`handle_hold`](Self::handle_hold) reports why a
-    /// drone is held back.
+    /// After a new view (list of relays), the text is sent once the relays have agreed on their positions. It is sent
+    /// only if the relay controls the drone and the guard does not hold the drone back.
+    /// [`handle_hold`](Self::handle_hold) reports why a drone is held back.
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {
@@ -506,7 +508,7 @@ impl Autopilot {
             .is_some_and(|at| now.since(at) >= self.recovery);
     }
 
-    /// Returns the cause of the last loss of control, and the autopilot's mode.
+    /// Returns the cause of a loss of control at this moment, and the autopilot's mode.
     fn release(&self) -> Release {
         let vehicle = &self.vehicle;
         let mode = vehicle.mode().unwrap_or(FlightMode::Other);
@@ -738,7 +740,7 @@ impl Autopilot {
         Some(Position { at, ..position })
     }
 
-    /// Returns the position of a drone too far from the line Tx to Rx, and the distance from that line. Such a drone
+    /// Returns the position of a drone too far from the line Tx to Rx, and its distance from this line. Such a drone
     /// has no position in the mission's coordinates.
     ///
     /// `None` if the drone is near the line, or if its last position is older than 3 s. Constant work.
@@ -755,8 +757,8 @@ impl Autopilot {
         self.noise.take()
     }
 
-    /// Returns the side whose lost relays the operator has reported as landed, for `Relay::clear_lost`. `None` if there
-    /// is no new report since the last call.
+    /// Returns the side whose lost relays the operator has reported as landed. The caller passes the side to
+    /// `Relay::clear_lost`. `None` if there is no new report since the last call.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
         self.clearance.take_cleared()
     }
@@ -810,8 +812,8 @@ impl Autopilot {
         self.parser.counters()
     }
 
-    /// Signs all frames with the key of `signing`, and accepts only frames signed with it. Of unsigned frames, only
-    /// RADIO_STATUS of a radio is accepted, because a radio cannot sign. A ground station sets the autopilot's key
+    /// Signs all frames with the key of `signing`, and accepts only frames signed with this key. The only exception is
+    /// the unsigned RADIO_STATUS of a radio, because a radio cannot sign. A ground station sets the autopilot's key
     /// (SETUP_SIGNING).
     #[cfg(feature = "mavlink-signing")]
     pub const fn sign(&mut self, signing: Signing) {
@@ -937,7 +939,7 @@ impl Autopilot {
         (is_news, position)
     }
 
-    /// Replaces this link's line from Tx to Rx by that of the relay's mission, if the two lines differ.
+    /// Replaces this link's line from Tx to Rx by the line of the relay's mission, if the two differ.
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();

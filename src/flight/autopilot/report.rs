@@ -17,13 +17,14 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Minimum time between two equal lines to the operator, ms. For lines that require action now see [`URGENT`].
+/// Minimum time between two transmissions of the same text line to the operator, ms. Critical lines use [`URGENT`]
+/// instead.
 const SPACING: u32 = 10_000;
 
-/// Minimum time between two equal lines that require action now, ms.
+/// Minimum time between two transmissions of the same critical text line to the operator, ms.
 const URGENT: u32 = 5_000;
 
-/// Maximum number of different lines to the operator within [`SPACING`].
+/// Maximum number of different text lines sent to the operator within [`SPACING`].
 const RECENT: usize = 16;
 
 /// Maximum number of queued lines written by this link.
@@ -31,12 +32,12 @@ const LINES: usize = 6;
 /// Maximum number of queued texts written by the firmware.
 const TEXTS: usize = 3;
 
-/// Interval between two transmissions of the numbers (SIR and position) to the operator.
+/// Interval at which the chain's SIR and the setpoint's coordinates are sent to the operator.
 const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 
-/// Topic of a line to the operator. A newer line replaces a waiting line of the same topic.
+/// Topic of a text line to the operator. A newer line makes an unsent older line of the same topic obsolete.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
     /// Event about the control of the drone: the relay takes or loses control.
@@ -70,7 +71,8 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Returns the order to leave. `is_battery` is false if the operator or the firmware has requested the departure.
+    /// Returns the order to the pilot to fly home. `is_battery` is true if the reason is the battery, and false if the
+    /// operator or the firmware has requested the departure.
     pub(super) const fn leave(is_battery: bool) -> Self {
         let why = if is_battery { "battery" } else { "relay" };
         Self {
@@ -98,7 +100,7 @@ impl Line {
 
     /// Returns the text for the reason why the guard (collision avoidance) holds the drone back on `side`.
     ///
-    /// If `reason` is `None`, the text says that the reason has ended.
+    /// If `reason` is `None`, the text says that the guard no longer holds the drone back on this side.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
             Side::Upstream => (Topic::Upstream, " the previous drone"),
@@ -151,7 +153,7 @@ fn hash(text: [&str; 2]) -> u32 {
     })
 }
 
-/// Returns the time from `now` to `until` (a wrapping time in ms); `None` if it has passed.
+/// Returns the time from `now` to `until`, in ms that wrap after 49 days; `None` if `until` has passed.
 fn left(now: Instant, until: u32) -> Option<Duration> {
     let left = until.wrapping_sub(millis(now.as_micros()));
     (1..=SPACING)
@@ -164,11 +166,11 @@ fn left(now: Instant, until: u32) -> Option<Duration> {
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
-    /// Hashes of the lines sent in the last 10 s. Each comes with the earliest time at which an equal line may be sent,
-    /// in wrapping ms.
+    /// Hashes of the lines sent in the last 10 s. Each hash has the earliest time at which the same line may be sent
+    /// again, in ms that wrap after 49 days.
     recent: Vec<(u32, u32), RECENT>,
-    /// Hash of the last line sent on each topic; 0 before the first line. An equal line that would have to wait is
-    /// dropped.
+    /// Hash of the last line sent on each topic; 0 before the first line. If the same line is queued again and cannot
+    /// be sent at once, it is dropped.
     newest_sent: [u32; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
     /// Number of values (SIR and position) sent to the operator in the present second.
@@ -202,8 +204,8 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. The time between equal lines
-    /// must be at least `spacing` ms.
+    /// Returns true if a line with the hash `hash` may be sent at `now`, and then records it as sent. The same line may
+    /// be sent again after `spacing` ms.
     fn passes(&mut self, now: Instant, hash: u32, spacing: u32) -> bool {
         self.recent.retain(|(_, until)| left(now, *until).is_some());
         let until = millis(now.as_micros()).wrapping_add(spacing);
@@ -219,7 +221,7 @@ impl Report {
         });
     }
 
-    /// Removes and returns the next line to send at `now`, with its severity; `None` if there is none.
+    /// Removes and returns the next line that may be sent at `now`, with its severity. `None` if there is none.
     fn next_line(&mut self, now: Instant) -> Option<(u8, String<50>)> {
         let mut at = 0;
         while let Some(line) = self.lines.get(at).copied() {
@@ -321,7 +323,7 @@ pub(super) type RelayNumbers = [u16; MOST];
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum AutopilotEvent {
-    /// First message of an autopilot of this kind.
+    /// The first message of an autopilot has been received. The value is the kind of autopilot.
     Found(Kind),
     /// The autopilot has restarted.
     Restarted,
@@ -330,14 +332,14 @@ pub enum AutopilotEvent {
     /// The relay has lost control of the drone. This event comes together with [`State::Standby`], or up to 1.3 s later
     /// if the cause is possibly a geofence.
     Released(Release),
-    /// Reason why the relay cannot control the drone now.
+    /// The relay cannot control the drone now. The value is the reason.
     ///
-    /// The pilot cannot give the relay control by OFFBOARD or GUIDED, or the relay does not use the mode that the pilot
-    /// has chosen.
+    /// Either the pilot cannot give the relay control by OFFBOARD or GUIDED, or the pilot has chosen one of these modes
+    /// and the relay does not use it.
     Waits(WaitReason),
     /// The pilot can now give the relay control of the drone by OFFBOARD or GUIDED.
     Ready,
-    /// The autopilot refuses the target: for 3 s it has reported a target other than the sent one.
+    /// The autopilot refuses the target: for 3 s it has reported targets other than the sent ones.
     ///
     /// The sent position is outside the autopilot's geofence, or a second companion sends targets to the same
     /// autopilot.
@@ -363,14 +365,14 @@ pub enum AutopilotEvent {
     },
     /// The link denied an operator's command that reports lost relays as landed.
     ///
-    /// The numbers in the command are not exactly those of all lost relays of one side.
+    /// The numbers in the command are not exactly the numbers of all lost relays of one side.
     ClearRefused {
         /// Numbers of the relays in the command, padded with zeros.
         relays: [u16; MOST],
         /// MAVLink address of the command's sender.
         from: Address,
     },
-    /// The signatures of autopilot and link do not match.
+    /// The signatures of the autopilot and of this link do not match. The value is the kind of mismatch.
     Mistrusted(Mistrust),
 }
 
@@ -381,7 +383,8 @@ pub(super) struct Events {
     pub(super) restarted: bool,
     pub(super) released: Option<Release>,
     pub(super) state: Option<State>,
-    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], the newer of the two. `None` if none is pending.
+    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`]; a newer event replaces an older one. `None` if
+    /// none is pending.
     pub(super) waits: Option<AutopilotEvent>,
     pub(super) breached: bool,
     pub(super) refused: bool,

@@ -47,15 +47,15 @@ pub(super) struct Observed {
     pub(super) is_received: bool,
     /// True if the drone is armed and in the air.
     pub(super) flying: bool,
-    /// True if the pilot has chosen OFFBOARD or GUIDED since this link started. In these modes the relay sets the
-    /// target.
+    /// True if the autopilot is in OFFBOARD or GUIDED, and this mode counts as the pilot's choice. In these modes the
+    /// relay sets the target.
     pub(super) granted: bool,
     /// True if the drone's position is known.
     pub(super) located: bool,
 }
 
 impl State {
-    /// Returns the next control state. The next state follows from this state and the observations `observed`.
+    /// Returns the control state that follows from this state and the observations `observed`.
     pub(super) const fn next(self, observed: Observed) -> Self {
         let Observed {
             is_received: there,
@@ -89,9 +89,9 @@ const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 /// Kind of autopilot firmware: PX4 or ArduCopter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// PX4: the mode OFFBOARD gives control for as long as targets are sent.
+    /// PX4: the relay controls the drone in the mode OFFBOARD, as long as it sends targets.
     Px4,
-    /// ArduCopter: the mode GUIDED gives control, and a target stays valid until the next one.
+    /// ArduCopter: the relay controls the drone in the mode GUIDED. A target stays valid until the next target.
     ArduCopter,
 }
 
@@ -202,12 +202,12 @@ impl Release {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {
-    /// The autopilot is in its failsafe, which ends when the pilot chooses a mode.
+    /// The autopilot is in its failsafe. The failsafe ends when the pilot chooses a flight mode.
     Failsafe,
     /// The autopilot's messages arrive late.
     Link,
-    /// The autopilot was in OFFBOARD or GUIDED before this link started. The pilot must first choose a different mode,
-    /// and then this mode again.
+    /// The autopilot was already in OFFBOARD or GUIDED when this link started. The pilot must choose a different mode,
+    /// and then OFFBOARD or GUIDED again.
     Found,
     /// No mode change by the pilot has been received since this link started.
     Unseen,

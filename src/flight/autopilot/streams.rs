@@ -10,30 +10,31 @@ use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time in which received messages are counted. At the end of this time, a message that came too seldom is requested
-/// again.
+/// Time in which received messages are counted. A message received at less than half of its requested rate is then
+/// requested again.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
 /// Maximum time from a request for a message to its answer.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Number of [`WINDOW`]s without a requested message after which the requests for it end.
+/// Number of consecutive [`WINDOW`]s without a message after which this message is no longer requested.
 ///
-/// A message without which the drone cannot fly is requested every [`SELDOM`] windows instead.
+/// A message without which the drone cannot be controlled is still requested, but only every [`SELDOM`] windows.
 const MAX_SILENT_WINDOWS: u8 = 4;
-/// Number of [`WINDOW`]s between two requests for a vital message that does not arrive.
+/// Number of [`WINDOW`]s between two requests for a vital message that does not arrive. A vital message is one without
+/// which the drone cannot be controlled.
 const SELDOM: u8 = 16;
 
 /// Number of unanswered requests after which the autopilot is assumed not to receive the link's frames.
 const UNANSWERED: u8 = 2;
 
-/// Values of `MAV_RESULT` by which the autopilot denies a request for good.
+/// Values of `MAV_RESULT` that deny a request; the denied message is not requested again.
 const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// True if the drone cannot be controlled without the message. The messages that are not vital (geofence, target)
+    /// True if the drone cannot be controlled without the message. All other messages (target, geofence, battery, home)
     /// are not sent by every autopilot.
     is_vital: bool,
 }
@@ -66,7 +67,7 @@ const REQUESTED: [RequestedMessage; 6] = [
 struct Stream {
     is_requested: bool,
     messages: u32,
-    /// Number of consecutive windows in which the requested message was not received.
+    /// Number of consecutive [`WINDOW`]s in which the requested message was not received.
     silent_windows: u8,
     is_denied: bool,
 }
@@ -119,7 +120,7 @@ impl Streams {
         }
     }
 
-    /// Returns whether the autopilot answers requests; `None` if unknown.
+    /// Returns `Some(true)` if the autopilot answers requests, `Some(false)` if it does not. `None` if unknown.
     pub(super) const fn answers_requests(&self) -> Option<bool> {
         if self.is_answered {
             Some(true)
@@ -177,7 +178,7 @@ impl Streams {
 
     /// Returns the next message to request, and its interval in µs; `None` if no request is due.
     ///
-    /// Battery messages are requested only if the endurance is computed (`counts` is true).
+    /// Battery messages are requested only if `counts` is true: the endurance is then computed from them.
     pub(super) fn take(&mut self, now: Instant, kind: Kind, counts: bool) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.outstanding {
             if now.since(at) < ANSWER {

@@ -11,7 +11,7 @@ use crate::flight::mavlink::outgoing::FrameBytes;
 use crate::flight::mavlink::signing::{Flaw, Signing};
 use crate::time::Instant;
 
-/// Number of consecutive heartbeats with a signature mismatch before the mismatch is reported.
+/// Number of consecutive heartbeats with the same signature mismatch before the mismatch is reported.
 const IN_A_ROW: u8 = 3;
 
 /// Mismatch between the signatures of an autopilot and those of the link.
@@ -34,7 +34,7 @@ pub enum Mistrust {
 impl Mistrust {
     const ALL: [Self; 4] = [Self::NoKey, Self::Unsigned, Self::OtherKey, Self::Old];
 
-    /// Returns the bit of this kind of mismatch, for sets of kinds.
+    /// Returns the bit of this kind of mismatch in a bit mask of kinds.
     const fn bit(self) -> u8 {
         1 << self as u8
     }
@@ -55,7 +55,7 @@ impl From<Flaw> for Mistrust {
 pub(super) struct Trust {
     signing: Option<Signing>,
     refused: u32,
-    /// Signature mismatch of the last heartbeats, and the number of heartbeats in a row with it. `None` if the last
+    /// Signature mismatch of the last heartbeat, and the number of consecutive heartbeats with it. `None` if the last
     /// heartbeat had no mismatch.
     row: Option<(Mistrust, u8)>,
     /// Bit mask of the kinds of mismatch that must be reported.
@@ -65,7 +65,7 @@ pub(super) struct Trust {
 }
 
 impl Trust {
-    /// Returns the next received message that passes the signature check, if any; otherwise `None`.
+    /// Returns the next received message that passes the signature check; `None` if there is none.
     pub(super) fn next_received(&mut self, now: Instant, parser: &mut Parser) -> Option<Received> {
         loop {
             let taken = parser.next_frame(|received, frame| {
@@ -106,7 +106,7 @@ impl Trust {
             return (true, no_key(received));
         };
         match received.message {
-            // The frame is not a heartbeat, or its sender cannot sign.
+            // The message is not decoded and thus has no effect, or its sender is a radio, which cannot sign.
             None | Some(Incoming::RadioStatus { .. }) => (true, None),
             Some(_) => match signing.check(now, received, frame) {
                 Ok(()) => (true, None),
@@ -115,7 +115,7 @@ impl Trust {
         }
     }
 
-    /// Signs all frames and checks received ones with the key of `signing` from now on.
+    /// Sets the key of `signing`, with which all frames are signed and all received frames are checked.
     pub(super) const fn sign_with(&mut self, signing: Signing) {
         self.signing = Some(signing);
     }
@@ -133,8 +133,8 @@ impl Trust {
         }
     }
 
-    /// Returns the next signature mismatch to report. Each kind is returned once. `hears` states if the autopilot
-    /// answers requests; `None` if unknown.
+    /// Returns the next signature mismatch to report; each kind is returned once. `hears` is true if the autopilot
+    /// answers requests, and `None` if that is unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL

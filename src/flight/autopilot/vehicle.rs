@@ -17,10 +17,11 @@ use crate::time::{Duration, Instant};
 /// Time without a heartbeat after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Age from which a received position of the drone is too old to be used.
+/// Age at which a received position of the drone is too old to be used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// Silence of the autopilot after which a PX4 is possibly in its failsafe.
+/// Time without a message of the autopilot after which a PX4 is possibly in its failsafe. Messages about the battery or
+/// the home position do not count.
 ///
 /// A PX4 enters its failsafe after a second without a target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
@@ -90,15 +91,16 @@ pub(super) enum VehicleUpdate {
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
-    /// Time at which the last message of any kind was received from the autopilot; `None` before the first.
+    /// Time of the last message received from the autopilot; `None` before the first. Messages about the battery or the
+    /// home position do not count.
     frame_at: Option<Instant>,
     mode: u32,
     /// True while the autopilot is in OFFBOARD or GUIDED, in which the relay sets the target.
     granted: bool,
     /// Value of `MAV_STATE` in the autopilot's last heartbeat.
     status: u8,
-    /// True if the mode OFFBOARD or GUIDED, present or next, counts as chosen by the pilot. See
-    /// [`Self::review_choice`].
+    /// True if the present mode OFFBOARD or GUIDED counts as the pilot's choice. In any other mode: true if the next
+    /// change to OFFBOARD or GUIDED will count as the pilot's choice. See [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
@@ -109,7 +111,8 @@ pub(super) struct Vehicle {
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// Measurement time of the last position, also of one too far from the line Tx to Rx. `None` before the first.
+    /// Measurement time of the last position; `None` before the first. Positions too far from the line Tx to Rx count,
+    /// too.
     measured_at: Option<Instant>,
     position: Option<Position>,
     /// Position to return to (HOME_POSITION); `None` if unknown.
@@ -256,7 +259,7 @@ impl Vehicle {
         }
     }
 
-    /// Withdraws the right to control the drone if its mode has possibly changed without the pilot.
+    /// Withdraws the right to control the drone if the mode has possibly changed without the pilot.
     ///
     /// A PX4 in its failsafe resumes OFFBOARD once it receives targets. In OFFBOARD a PX4 enters its failsafe after a
     /// second without a target. So a PX4 is sent targets only after it has reported a mode other than OFFBOARD outside
@@ -279,13 +282,13 @@ impl Vehicle {
         };
     }
 
-    /// Withdraws the right to control the drone, because targets were not sent in time. The pilot has to choose the
-    /// mode again.
+    /// Withdraws the right to control the drone: the pilot has to choose OFFBOARD or GUIDED again. Needed if a target
+    /// to a PX4 is overdue, or the relay's readiness has changed.
     pub(super) const fn unchoose(&mut self) {
         self.chosen = false;
     }
 
-    /// Returns true if the autopilot's messages are possibly delayed and show an old state.
+    /// Returns true if the autopilot's messages are possibly delayed, so that they show an earlier state.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         self.echo.is_late(now) || self.measured_at.is_none_or(|at| now.since(at) >= STALE)
     }
@@ -327,8 +330,8 @@ impl Vehicle {
         self.home = None;
     }
 
-    /// Converts the stored position to a new line from Tx to Rx by the function `moved`. If `moved` returns `None`, the
-    /// position is dropped.
+    /// Converts the stored position to the coordinates of a new line from Tx to Rx. The function `moved` converts a
+    /// position. If `moved` returns `None`, the stored position is dropped.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -366,9 +369,9 @@ impl Vehicle {
 
     /// Returns the newest remaining time of flight and the time of the flight home, s.
     ///
-    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for an
-    /// unknown time. The time of the flight home is unknown without a recent position. It is also unknown if the home
-    /// is too far from the line Tx to Rx.
+    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for a
+    /// time that is unknown. The time of the flight home is NaN without a recent position, or if the home position is
+    /// too far from the line Tx to Rx.
     pub(super) fn take_endurance(&mut self, now: Instant, axis: &Axis) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
         let home = axis.place(self.home?);
@@ -413,9 +416,9 @@ impl Vehicle {
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the time of the next change without a new message; `None` if there is none.
+    /// Returns the next time at which the state changes without a new message; `None` if there is none.
     ///
-    /// At that time a received value becomes too old, or a TIMESYNC request is due.
+    /// At that time a received value becomes too old to be used, or a TIMESYNC request is due.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -432,7 +435,7 @@ impl Vehicle {
 ///
 /// A single wrong report in flight then has no effect.
 const LANDED: Duration = Duration::from_millis(2_000);
-/// Age at which a BATTERY_STATUS or a position is too old for the endurance.
+/// Age at which a BATTERY_STATUS or a position is no longer used to compute the endurance.
 ///
 /// SYS_STATUS is used instead of an old BATTERY_STATUS. With an old position the time of the flight home is unknown.
 const OLD: Duration = Duration::from_millis(10_000);
@@ -442,19 +445,20 @@ const CERTAIN: f32 = 0.9;
 /// Remaining time of flight according to the battery's messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Arguments of `Autopilot::set_endurance`; `None` before its first call. Then [`UNSET`](Self::UNSET) is used, and
-    /// no messages are requested.
+    /// Arguments of `Autopilot::set_endurance`; `None` before its first call. While it is `None`, the values
+    /// [`UNSET`](Self::UNSET) are used, and no battery messages are requested.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
-    /// Remaining time of flight, s; NaN if unknown. `None` on the ground, and once the time has been read.
+    /// New remaining time of flight, s; NaN if the battery states none. `None` on the ground, and if there is no new
+    /// value since the last read.
     newest: Option<f32>,
 }
 
 impl Battery {
     const UNSET: [f32; 3] = [f32::NAN, 5.0, 1.5];
 
-    /// Returns true if a message about `battery` is used. BATTERY_STATUS is used for battery 0. SYS_STATUS (`None`) is
-    /// used only if no such BATTERY_STATUS came in the last 10 s.
+    /// Returns true if a message about `battery` is used. BATTERY_STATUS is used for battery 0. SYS_STATUS (`battery`
+    /// is `None`) is used only if no BATTERY_STATUS of battery 0 came in the last 10 s.
     fn is_first(&mut self, now: Instant, battery: Option<u8>) -> bool {
         if battery == Some(0) {
             self.detailed_at = Some(now);
@@ -478,8 +482,8 @@ impl Battery {
     }
 }
 
-/// Newest noise measurement of a SiK radio: drone's position, and noise in W. `None` once the measurement has been
-/// read.
+/// Newest noise measurement of a SiK radio: the drone's position, and the noise power in W. `None` once the measurement
+/// has been read.
 #[derive(Clone, Debug)]
 pub(super) struct RadioNoise(Option<(Placement, f32)>);
 
@@ -503,7 +507,7 @@ impl RadioNoise {
 
 const PERIOD: Duration = Duration::from_millis(500);
 
-/// Maximum age of the newest answered TIMESYNC request before the link counts as late.
+/// Age of the newest answered TIMESYNC request at which the link counts as late.
 const LATE: Duration = Duration::from_millis(1_500);
 
 const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
@@ -511,8 +515,8 @@ const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
 /// Maximum age of a TIMESYNC request whose reply is still accepted.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// Number of low bits of a TIMESYNC time stamp that contain the link's tag. The higher bits contain the link's time in
-/// µs, enough for 200 days. The autopilot returns all bits unchanged.
+/// Number of low bits of a TIMESYNC time stamp that contain the link's tag, which marks its requests. The higher bits
+/// contain the link's time in µs, enough for 200 days. The autopilot returns all bits unchanged.
 const SHIFT: u32 = 20;
 /// Tag in the TIMESYNC requests of a link whose seed was not set.
 const TAG: u32 = 0xA_52A5;
@@ -594,7 +598,7 @@ impl Echo {
         self.answered_at
     }
 
-    /// Returns true while the autopilot's messages are possibly older than `LATE`.
+    /// Returns true while the autopilot's messages are possibly older than [`LATE`].
     pub(super) fn is_late(&self, now: Instant) -> bool {
         match (self.answered_at, self.begun_at) {
             (Some(at), _) => now.since(at) >= LATE,
@@ -603,7 +607,7 @@ impl Echo {
         }
     }
 
-    /// Returns the time of the next TIMESYNC request, or of a change of `is_late` if that is earlier. `None` if
+    /// Returns the time of the next TIMESYNC request or the next change of [`is_late`](Self::is_late). `None` if
     /// neither is pending.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let late = self.answered_at.map(|at| at + LATE).filter(|at| *at > now);
@@ -615,20 +619,19 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that counts as a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the time window in which the minimum delay is determined. The older half is replaced each time, so that the
-/// minimum covers the last 4 to 8 s.
+/// Half of the time window in which the minimum delay is determined. Every 4 s a new half replaces the older half, so
+/// that the minimum covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of the time window for the minimum delay.
+/// Minimum number of messages in a half of the time window before the next half begins.
 ///
-/// Otherwise a half could contain only the late messages after a pause of the link. Then the delay of these late
-/// messages would count as normal.
+/// With fewer messages, a half could contain only the late messages after a pause of the link. The delay of these late
+/// messages would then count as normal.
 const LEAST: u8 = 8;
 
-/// Assumed maximum drift between the clocks of relay and autopilot, as a fraction of time: 2^-10. The value is the
-/// exponent.
+/// Exponent of the assumed maximum drift between the clocks of relay and autopilot: 2^-10 of the time.
 ///
-/// With a faster drift messages seem late: the drift during the time window counts as delay.
+/// With a faster drift, messages seem late: the drift during the time window counts as delay.
 const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's clock.
@@ -645,8 +648,8 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum of the relay's clock minus the autopilot's clock, µs. The first number is for the previous half of the
-    /// time window, the second for the present half.
+    /// Minimum difference between the two clocks, µs: the relay's clock minus the autopilot's clock. The first number
+    /// is for the previous half of the time window, the second for the present half.
     least: [i64; 2],
     since: Instant,
     messages: u8,
@@ -655,8 +658,8 @@ struct Anchor {
 }
 
 impl RemoteClock {
-    /// Returns the time at which a message was created, on the relay's clock. The message arrived at `now`, and was
-    /// created `boot_ms` after the autopilot's start. `None` if the autopilot has restarted.
+    /// Returns the time on the relay's clock at which the autopilot created a message. The message arrived at `now`,
+    /// and was created `boot_ms` after the autopilot's start. `None` if the autopilot has restarted.
     pub(super) fn creation_time(&mut self, now: Instant, boot_ms: u32) -> Option<Instant> {
         let boot_us = i64::from(boot_ms) * 1_000;
         let difference = now.as_micros().cast_signed().saturating_sub(boot_us);
@@ -709,7 +712,7 @@ pub(super) const fn millis(micros: u64) -> u32 {
 /// Minimum time between two reports that the drone is too far from the line Tx to Rx.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// Maximum age of a position too far from the line Tx to Rx. An older one counts as unknown.
+/// Age at which a position too far from the line Tx to Rx is no longer used.
 const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 
 /// Position of a drone too far from the line Tx to Rx for the mission's coordinates.
@@ -757,7 +760,8 @@ pub(super) struct OffLineDetector {
 impl OffLineDetector {
     /// Records a position too far from the line Tx to Rx. Returns true if a report is due.
     ///
-    /// In the air a report is due once in 10 s. On the ground one is due until the drone has been near the line again.
+    /// In the air a report is due at most once in 10 s. On the ground only the first position is reported, until the
+    /// drone has been near the line again.
     pub(super) fn record(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;
@@ -770,8 +774,8 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone is near the line Tx to Rx. The next position on the ground that is far from the line is
-    /// reported again.
+    /// Records that the drone is near the line Tx to Rx. After that, the next position on the ground that is far from
+    /// the line is reported again.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;
@@ -867,8 +871,8 @@ mod clock_tests {
         }
     }
 
-    /// Checks that messages count as recent if the autopilot's clock runs 1 % slow. A simulator's clock on a loaded
-    /// machine can be so slow.
+    /// Checks that messages count as recent even if the autopilot's clock runs 1 % slow. The clock of a simulator on a
+    /// loaded machine can run as slowly.
     #[test]
     fn a_clock_that_runs_one_percent_slow_is_never_blind() {
         let ages = ages(|ms| ms - ms / 100, |_| 5);
@@ -885,8 +889,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20), "{ages:?}");
     }
 
-    /// Checks a link whose delay jumps from 5 ms to 1.5 s. For 3 s after the jump, messages count as more than 1 s old.
-    /// From 9 s after the jump, the new delay counts as normal.
+    /// Checks a link whose delay jumps from 5 ms to 1.5 s. In the 3 s after the jump, messages count as more than 1 s
+    /// old. From 9 s after the jump, the new delay counts as normal.
     #[test]
     fn a_delay_that_grows_is_late_at_first() {
         let ages = ages(|ms| ms, |ms| if ms < 20_000 { 5 } else { 1_500 });
@@ -894,8 +898,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20));
     }
 
-    /// Checks messages that a cable delivers all at once after 7 s. The age of the first message is 7 s. Later messages
-    /// were sent later, so their ages are smaller.
+    /// Checks messages that a cable delivers all at once after 7 s. The first message counts as 7 s old. Messages that
+    /// were created later count as less old.
     #[test]
     fn a_burst_after_a_gap_is_old() {
         let held = 20_000..27_000;

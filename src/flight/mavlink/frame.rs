@@ -48,8 +48,8 @@ pub struct Address {
     pub component: u8,
 }
 
-/// Returns the checksum of a frame. `covered` are the bytes of the frame after its start byte. `known` has the
-/// message's CRC seed.
+/// Returns the checksum of a frame with the message properties `known`, which include the CRC seed. `covered` are the
+/// bytes of the frame from the second byte to the end of the payload.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);
@@ -63,9 +63,10 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
 pub struct Known {
     /// Id of the MAVLink message, 24 bits.
     pub id: u32,
-    /// CRC seed: a digest of the message's definition, by which both ends detect different definitions.
+    /// CRC seed, a digest of the message's definition. With different definitions at sender and receiver the checksum
+    /// fails.
     pub crc_extra: u8,
-    /// Length of the original fields, bytes, without extensions of later dialects.
+    /// Length of the message's original fields, bytes. Extension fields of later MAVLink dialects are not counted.
     pub length: u8,
 }
 
@@ -109,12 +110,12 @@ pub mod id {
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// Maximum length of the extensions that a later dialect may add to a message, bytes. A message with more bytes is
-/// treated as noise.
+/// Maximum length of the extension fields that a later MAVLink dialect may add to a message, bytes. Bytes that claim to
+/// be a longer message are skipped as noise.
 const ADDED: u8 = 24;
 
 impl Known {
-    /// Maximum payload length of this message, bytes, with the assumed extensions of later dialects.
+    /// Maximum payload length of this message, bytes. 24 bytes for extension fields of later dialects are included.
     pub const fn longest(self) -> u8 {
         self.length.saturating_add(ADDED)
     }
@@ -128,9 +129,10 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that the parser knows: those of this crate, and those whose payload can contain frames.
+/// Messages that the parser knows: those used by this crate, and those that can contain MAVLink frames.
 ///
-/// The parser skips a message with such a payload as a whole. So a frame inside the payload does not count as received.
+/// The parser skips a message that can contain frames as a whole. So a frame inside its payload does not count as
+/// received.
 const TABLE: [Known; 31] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::SYS_STATUS, 124, 31),

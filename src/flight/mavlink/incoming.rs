@@ -108,7 +108,7 @@ pub enum Incoming {
     },
     /// POSITION_TARGET_LOCAL_NED: the vehicle's target in its local frame; only the mask is read.
     PositionTargetLocal {
-        /// Mask of the target's values that the vehicle ignores: position, velocity, acceleration, yaw.
+        /// Mask of the parts of the target that the vehicle ignores: position, velocity, acceleration, yaw.
         type_mask: u16,
     },
     /// POSITION_TARGET_GLOBAL_INT: the vehicle's target.
@@ -119,7 +119,7 @@ pub enum Incoming {
         lon_e7: i32,
         /// Altitude of the target above the reference of `frame`, m.
         altitude_m: f32,
-        /// Mask of the target's values that the vehicle ignores: position, velocity, acceleration, yaw.
+        /// Mask of the parts of the target that the vehicle ignores: position, velocity, acceleration, yaw.
         type_mask: u16,
         /// Value of `MAV_FRAME`: 5 is above mean sea level.
         frame: u8,
@@ -238,10 +238,10 @@ impl Incoming {
     }
 }
 
-/// Step of a SiK radio's levels, 1/1.9 dB, as the binary logarithm of a power ratio: log2(10) / 19.
+/// Step of a SiK radio's signal levels, 1/1.9 dB, as log2 of the ratio of two powers: log2(10) / 19.
 const SIK_PER_UNIT: f32 = 0.174_838_32;
 
-/// Level 0 of a SiK radio, -127 dBm, as the binary logarithm of the power in W: -15.7 log2(10).
+/// Lowest signal level of a SiK radio (level 0, -127 dBm), as log2 of the power in W: -15.7 log2(10).
 const SIK_ZERO: f32 = -52.154_27;
 
 /// Returns the noise power for the value `noise` of a SiK radio's RADIO_STATUS, W.
@@ -277,15 +277,15 @@ pub struct Received {
 pub struct Counters {
     /// Number of valid MAVLink frames received.
     pub frames: u32,
-    /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. Most of them are
-    /// corrupted frames, but other received bytes can also look like a frame.
+    /// Number of corrupted frames: known messages with a wrong checksum or unknown incompatibility flags. Received
+    /// bytes that only look like a frame are counted, too.
     pub broken: u32,
 }
 
 /// Parser of MAVLink frames, with a buffer of one frame of maximum length.
 #[derive(Clone, Debug, Default)]
 pub struct Parser {
-    /// Received bytes. If there are any, they begin with a possible frame.
+    /// Received bytes that have not been parsed yet. The first byte, if any, is the start byte of a possible frame.
     bytes: Vec<u8, MAX_FRAME>,
     counters: Counters,
 }
@@ -329,8 +329,8 @@ impl Parser {
         self.next_frame(|received, _| received)
     }
 
-    /// Calls `read` with the next received message and the bytes of its frame, and returns the result. `None` without a
-    /// message.
+    /// Calls `read` with the next received message and its frame's bytes, and returns the result of `read`. `None` if
+    /// no complete message has been received.
     ///
     /// Work: for each received byte, at most one checksum over at most 266 bytes. In real frames a checksum is computed
     /// for at most one byte in ten, in maliciously chosen bytes for one in three.
@@ -360,7 +360,8 @@ impl Parser {
         self.counters
     }
 
-    /// Discards the first `length` received bytes, and more up to the next possible start of a frame.
+    /// Discards the first `length` received bytes. The bytes before the next possible start of a frame are discarded,
+    /// too.
     fn drop_front(&mut self, length: usize) {
         let rest = self.bytes.get(length..).unwrap_or_default();
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();
@@ -408,7 +409,7 @@ fn first(bytes: &[u8]) -> First {
     First::Frame(received, all)
 }
 
-/// Returns true if the checksum at `end` matches the bytes before it.
+/// Returns true if the checksum at index `end` of `bytes` matches the bytes from index 1 to `end`.
 fn holds(bytes: &[u8], end: usize, known: Known) -> bool {
     let said = bytes.get(end..).and_then(<[u8]>::first_chunk);
     bytes

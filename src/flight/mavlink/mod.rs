@@ -15,8 +15,8 @@ pub mod incoming;
 pub mod outgoing;
 #[cfg(feature = "mavlink-signing")]
 pub mod signing;
-/// Signing without the feature `mavlink-signing`. The type has no values, so that the compiler drops all code that
-/// signs.
+/// Replacement for the module `signing` without the feature `mavlink-signing`. The type `Signing` has no values, so
+/// that the compiler drops all code that signs.
 #[cfg(not(feature = "mavlink-signing"))]
 pub(crate) mod signing {
     use super::incoming::Received;

@@ -55,7 +55,7 @@ pub enum Outgoing<'a> {
         boot_ms: u32,
         /// Target position of the drone.
         at: Geodetic,
-        /// Target velocity toward north, east and down, m/s. `None` to stop at the target.
+        /// Target velocity toward north, east and down, m/s. `None` if the drone is to stop at the target.
         velocity_m_s: Option<[f32; 3]>,
         /// Heading of the drone, radians clockwise from north; `None` leaves it to the autopilot.
         yaw_rad: Option<f32>,
@@ -215,8 +215,8 @@ impl Outgoing<'_> {
     }
 }
 
-/// Writer of a message's fields into a frame. The frame never overflows, since these fields are at most `LONGEST`
-/// bytes.
+/// Writer of a message's fields into a frame. The frame never overflows, since the fields of a sent message have at
+/// most [`LONGEST`] bytes.
 struct Writer(FrameBytes);
 
 impl Writer {

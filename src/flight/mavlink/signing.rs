@@ -27,7 +27,7 @@ const TAG: usize = 6;
 /// Length of the link id and the timestamp in a signature, bytes.
 const STAMPED: usize = SIGNATURE - TAG;
 
-/// Maximum age of the first signed frame of a sender, in timestamp units of 10 µs: one minute.
+/// Maximum age of a frame from a sender not received before, in timestamp units of 10 µs: one minute.
 const BEHIND: u64 = 6_000_000;
 
 /// Maximum timestamp of a signature, in the year 2104.
@@ -35,17 +35,17 @@ const LAST: u64 = (1 << 48) - 1;
 
 const UNIT_US: u32 = 10;
 
-/// Time from 1970-01-01 to 2015-01-01, s. The timestamps of signatures start at the later date.
+/// Time from 1970-01-01 to 2015-01-01, s. The timestamps of signatures count from 2015-01-01.
 const BEGIN_S: u64 = 1_420_070_400;
 
-/// Number of senders whose timestamps are remembered. The autopilot counts as one; it also forwards signed frames of
-/// other systems.
+/// Number of senders whose last timestamps are stored: the autopilot and others. The autopilot forwards signed frames
+/// of other systems.
 const SENDERS: usize = 8;
 
 /// Sender of signed frames, with the minimum timestamp of its next frame, which prevents replays.
 ///
-/// If [`SENDERS`] senders are known, a new one replaces the sender whose last frame is the oldest. Then recorded frames
-/// of the replaced sender could be replayed if they are at most a minute old.
+/// If [`SENDERS`] senders are stored, a new sender replaces the sender with the oldest timestamp. An attacker could
+/// then replay recorded frames of the replaced sender, if they are at most a minute old.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
@@ -62,7 +62,7 @@ impl Stamp {
     /// Timestamp on a board that does not know the date and time.
     pub const UNKNOWN: Self = Self(0);
 
-    /// Converts a Unix time, µs since 1970-01-01.
+    /// Returns the timestamp of a Unix time, µs since 1970-01-01.
     pub const fn of_unix_micros(micros: u64) -> Self {
         let units = (micros / UNIT_US as u64).saturating_sub(BEGIN_S * 100_000);
         Self(if units < LAST { units } else { LAST })
@@ -77,7 +77,7 @@ pub enum Flaw {
     Unsigned,
     /// The signature was made with a different key than the link's, or the frame was altered.
     Key,
-    /// The signature's timestamp is too old, or not above the last one of its sender.
+    /// The signature's timestamp is too old, or not above that of the sender's last accepted frame.
     Old,
 }
 
@@ -86,7 +86,7 @@ pub enum Flaw {
 pub struct Signing {
     key: [u8; 32],
     link: u8,
-    /// Timestamp of this link at the time `at`, in units of 10 µs.
+    /// Timestamp at the time `at` of this link's clock, in units of 10 µs.
     stamp: u64,
     at: Instant,
     /// Timestamp of the last sent frame, in units of 10 µs.
@@ -95,14 +95,14 @@ pub struct Signing {
 }
 
 impl core::fmt::Debug for Signing {
-    /// Formats the value without the key, which must not appear in logs.
+    /// Writes a placeholder, because the key must not appear in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Signing(..)")
     }
 }
 
 impl Signing {
-    /// Creates signing with `key` and the link id `link`. `stamp` is the timestamp at `now`.
+    /// Creates signing with the key `key` and the link id `link`. `stamp` is the timestamp of the time `now`.
     pub const fn new(key: [u8; 32], link: u8, stamp: Stamp, now: Instant) -> Self {
         const NOBODY: Sender = Sender {
             from: Address {
@@ -122,7 +122,7 @@ impl Signing {
         }
     }
 
-    /// Advances the timestamp to `now`, by at most about an hour per call.
+    /// Advances this link's timestamp to `now`. A longer time than about an hour takes several calls.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;
@@ -213,7 +213,7 @@ impl Signing {
     }
 }
 
-/// Returns true if two truncated hashes are equal, in constant time.
+/// Returns true if two truncated hashes are equal. The comparison takes constant time, against timing attacks.
 fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     let differs = one
         .into_iter()

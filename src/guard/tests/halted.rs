@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Reports the position `place` to the guard, long after its last setpoint.
+    /// Reports the position `place` to the guard, 1 s after the previous report.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);
@@ -19,8 +19,8 @@ impl One {
     }
 }
 
-/// Returns a message of a neighbour that knows this relay's association (session). It has the fence number `number`,
-/// and `x_m` as the neighbour's x and agreed x.
+/// Returns a message of a neighbour that knows this relay's association (session). The message has the fence number
+/// `number`. The neighbour's x and its agreed x are `x_m`.
 fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
     let echo = one.sent(side).association;
     Fence {
@@ -72,7 +72,8 @@ fn a_start_outside_the_geofence_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Checks that relays with an uncertain order along x count as in order only if they may pass.
+/// Checks that relays with an uncertain order along x count as in order if they may pass each other. In all other cases
+/// they do not.
 ///
 /// The order is uncertain if their reported x differ by less than the errors of the reports. They may pass each other
 /// if lateral offset and altitude keep them at least the separation apart.
@@ -113,8 +114,8 @@ fn relays_within_the_error_are_in_order_if_they_may_pass() {
     }
 }
 
-/// Checks that two neighbours in the wrong order along x halt the relay between them. Within the errors of the reports,
-/// each of them may seem to be on the correct side of this relay.
+/// Checks that two neighbours in the wrong order along x halt the relay between them. Because of the errors of the
+/// reports, each neighbour alone may seem to be on its correct side of this relay.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -179,8 +180,8 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// Checks that a relay that halts on its way into the geofence stops outside. A neighbour may be at the nearest
-/// position inside.
+/// Checks that a relay that halts on its way into the geofence stops where it is, outside. At the nearest position
+/// inside, there may be a neighbour.
 #[test]
 fn a_relay_that_halts_outside_the_geofence_stops_there() {
     let mut one = One {
@@ -254,7 +255,7 @@ fn a_halt_outlasts_a_reboot_of_its_requester() {
     }
 }
 
-/// Checks that the chain halts if a drone is flown again on the wrong side of a neighbour.
+/// Checks that the chain halts if a drone leaves manual control on the wrong side of a neighbour.
 #[test]
 fn a_relay_flown_again_out_of_order_requests_a_halt() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -424,8 +425,8 @@ fn a_reported_position_in_manual_flight_avoids_a_halt() {
     }
 }
 
-/// Checks that a late fence message from before a reboot is not taken as its sender's position. Its x is that of the
-/// fence (limit of x), which may be far from the sender.
+/// Checks that a late fence message from before a reboot does not count as its sender's position. The x in such a
+/// message is that of the fence (limit of x), which may be far from the sender.
 #[test]
 fn an_old_fence_gives_no_position_of_its_owner() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -497,11 +498,11 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Checks that relay 2 raises its fence (limit of x for relay 3) after relay 1 has started beside it. Relay 3 has
-/// passed the lower fence before.
+/// Checks that relay 2 raises its fence (limit of x for relay 3) after relay 1 has started beside it. Relay 3 was
+/// already beyond the fence before it was raised.
 ///
-/// Relay 1, upstream, is in order with relay 2 only within the error of the reports. So the fence of relay 2 must be
-/// the separation beyond relay 1, too (rule 7).
+/// Relay 1, upstream, is in order with relay 2 only within the error of the reports. So the fence of relay 2 must be at
+/// least the separation beyond relay 1, too (rule 7 of the guard).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

@@ -66,7 +66,7 @@ impl One {
         one
     }
 
-    /// Reports the x `x_m` to the guard, long after its last setpoint.
+    /// Reports the x `x_m` to the guard, 1 s after the previous report.
     fn is_at(&mut self, x_m: f32) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, at(x_m));
@@ -141,8 +141,8 @@ fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Checks rule 1: a relay stays beyond its upstream neighbour's fence (limit of x). This holds even if the downstream
-/// neighbour started too close to it.
+/// Checks rule 1 of the guard: a relay stays beyond its upstream neighbour's fence (limit of x). This holds even if the
+/// downstream neighbour started too close to the relay.
 #[test]
 fn a_relay_between_two_fences_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
@@ -166,7 +166,7 @@ fn a_relay_between_two_fences_keeps_its_promise() {
     );
 }
 
-/// Checks rule 9: a relay keeps the separation from the last position of a lost neighbour.
+/// Checks rule 9 of the guard: a relay stays the separation away from a lost neighbour's last position.
 #[test]
 fn a_lost_relay_is_kept_clear_of() {
     let mut one = One::new([None, Some(2)], 100.0, 400.0);
@@ -262,8 +262,8 @@ fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
     }
 }
 
-/// Checks that a relay does not approach the relays beyond a removed neighbour too early. It first has to receive one
-/// of them.
+/// Checks that a relay does not approach the relays beyond a removed neighbour too early. It first has to receive a
+/// message of one of those relays.
 #[test]
 fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
@@ -383,7 +383,7 @@ impl Pair {
     }
 }
 
-/// Checks rule 8: no relay moves before it has received a message of its neighbour.
+/// Checks rule 8 of the guard: no relay moves before it has received a message of its neighbour.
 #[test]
 fn no_relay_moves_before_its_neighbour_is_received() {
     let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);
@@ -402,7 +402,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Checks rules 3, 4 and 6 for moves toward Rx. Relay 1 advances only as far as relay 2 has moved.
+/// Checks rules 3, 4 and 6 of the guard for moves toward Rx. Relay 1 advances only as far as relay 2 has moved.
 #[test]
 fn the_owner_follows_the_follower() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
@@ -426,7 +426,7 @@ fn the_owner_follows_the_follower() {
     );
 }
 
-/// Checks rules 1 and 5 for moves toward Tx: first relay 1 moves, then the fence, then relay 2.
+/// Checks rules 1 and 5 of the guard for moves toward Tx. First relay 1 moves, then the fence, then relay 2.
 #[test]
 fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -440,7 +440,7 @@ fn the_follower_follows_the_owner() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Checks rule 3: late messages, and messages with an older fence, let no relay move.
+/// Checks rule 3 of the guard: no relay moves because of late messages, or of older fences.
 #[test]
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -494,7 +494,7 @@ fn an_old_report_frees_nothing() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Checks rule 7: two relays that start closer than the separation first move apart along x.
+/// Checks rule 7 of the guard: relays that start closer than the separation first move apart along x.
 #[test]
 fn a_start_too_close_is_opened_before_anything_else() {
     let mut pair = Pair::new([100.0, 500.0], [104.0, 600.0]);
@@ -577,10 +577,10 @@ fn a_restart_is_distinguished_from_late_messages() {
     );
 }
 
-/// Checks that a relay out of order with its downstream neighbour keeps the upstream one in place.
+/// Checks that a relay in the wrong order with its downstream neighbour halts its upstream neighbour.
 ///
-/// Its message requests a halt of the upstream neighbour. Usually the x in a message permits a move, but a flag in this
-/// message states that it does not.
+/// The relay's message requests a halt of the upstream neighbour. Usually the x in a message permits a move, but a flag
+/// in this message states that it does not.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);

@@ -70,7 +70,7 @@ impl Row {
     }
 }
 
-/// Checks rule 15: the neighbours of a drone in manual control come no nearer to it.
+/// Checks rule 15 of the guard: neighbours of a drone in manual control come no nearer to it.
 #[test]
 fn no_relay_comes_nearer_to_one_in_manual_flight() {
     let mut row = Row::new();
@@ -110,7 +110,7 @@ fn no_relay_comes_nearer_to_one_in_manual_flight() {
     assert_eq!(row.setpoint(0), Some(180.0));
 }
 
-/// Checks rule 15: neighbours do not fly through a drone in manual control that is in their way.
+/// Checks rule 15 of the guard: neighbours do not fly through a drone in manual control on their way.
 #[test]
 fn no_relay_flies_through_a_drone_in_manual_flight() {
     for (y_m, expected_m) in [(0.0, 80.0), (6.0, 80.0), (20.0, 20.0)] {
@@ -151,7 +151,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. Beside means
+/// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. "Beside" means
 /// closer than the separation along x.
 #[test]
 fn no_relay_moves_across_toward_a_drone_beside_it() {
@@ -285,7 +285,7 @@ fn a_relay_flown_again_begins_as_after_a_start() {
 }
 
 /// Checks that the notice of leaving an association (session) is repeated. The repetition ends when the neighbour has
-/// started a new one, but not when the pilot gives the drone back.
+/// started a new association, but not when the pilot gives control back.
 #[test]
 fn lost_messages_are_repeated() {
     let mut row = Row::new();
@@ -312,7 +312,7 @@ fn lost_messages_are_repeated() {
 
 /// Checks that late messages change nothing after a pilot has taken a drone over or given it back.
 ///
-/// An old fence message does not end the manual control for the neighbours, nor does an old leave notice begin it.
+/// For the neighbours, an old fence message does not end the manual control, and an old leave notice does not begin it.
 #[test]
 fn late_messages_do_not_change_who_is_flown() {
     let mut row = Row::new();
@@ -348,7 +348,7 @@ fn late_messages_do_not_change_who_is_flown() {
     assert_eq!(row.setpoint(0), Some(200.0 - APART));
 }
 
-/// Checks that two neighbours start a new association (session) after both were flown by hand.
+/// Checks that two neighbours start a new association (session) after both were in manual control.
 #[test]
 fn two_neighbours_are_released_and_flown_again() {
     let mut row = Row::new();
