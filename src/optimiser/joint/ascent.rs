@@ -25,17 +25,18 @@ const LEAST_TRUST: f32 = 1e-4;
 /// Rx. The usual length is 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the upper limit on the target SIR, in ln(SIR). The limit is raised if the chain meets it, but does
-/// not reach the upper bound of all chains.
+/// First increase of the upper limit on the target SIR, in ln(SIR). The limit is raised if the chain meets the limit,
+/// but its SIR does not reach the upper bound on the SIR of any chain.
 const EXCESS: f32 = 0.03;
 
-/// First upper limit on the chain's slack, divided by the distance from Tx to Rx. Without the limit a large slack could
-/// outweigh the penalty for relays too near the interferer.
+/// First upper limit on the slack, the length by which a chain reaches beyond Rx. The unit is the distance from Tx to
+/// Rx. Without the limit a large slack could outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Lowest value to which the upper limit on the chain's slack can fall. The unit is the distance from Tx to Rx.
+/// Lowest upper limit on the slack, the length by which a chain reaches beyond Rx. The unit is the distance from Tx to
+/// Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Factor on a negative slack of a chain, when two chains are compared.
+/// Factor on a negative slack (length by which a chain ends before Rx), when two chains are compared.
 const SHORT: f32 = 2.0;
 
 /// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
@@ -52,8 +53,8 @@ const FORESEEN: f32 = 1e-4;
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Largest distance to Rx by which a chain is too short and is still improved again. The unit is the distance from Tx
-/// to Rx.
+/// Maximum distance from the chain's end to Rx at which a chain that is too short is improved again. The unit is the
+/// distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -66,7 +67,8 @@ pub(crate) enum AscentStep {
     Raise,
     /// Compute new moves of the relays by a backward pass, from the last relay to the first.
     Again,
-    /// End the improvement of this chain, or repeat the improvement with a lower limit on the slack.
+    /// End the improvement of this chain, or repeat it with a lower upper limit on the slack. The slack is the length
+    /// by which the chain reaches beyond Rx.
     Over,
 }
 
@@ -78,8 +80,8 @@ pub(crate) struct Ascent {
     /// chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target, in ln(SIR), at which the chain is compared with the upper bound of all chains. This target is raised if
-    /// the chain does not reach the bound.
+    /// Target, in ln(SIR), at which the chain is compared with the upper bound on any chain's SIR. This target is
+    /// raised if the chain does not reach the bound.
     pub(crate) limit: f32,
     /// Next increase of `limit`, in ln(SIR).
     excess: f32,
@@ -133,7 +135,7 @@ impl Ascent {
 
     /// Returns this state with `limit` as the upper limit on the target, in ln(SIR).
     ///
-    /// At this target the chain is compared with the upper bound of all chains.
+    /// At this target the chain is compared with the upper bound on the SIR of any chain.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -142,19 +144,20 @@ impl Ascent {
         }
     }
 
-    /// Returns the upper limit on the chain's slack, m. Slack above this limit does not count when chains are
-    /// compared.
+    /// Returns the upper limit on the slack, the length by which the chain reaches beyond Rx, m. Slack above this limit
+    /// does not count when chains are compared.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the upper limit on the chain's slack.
+    /// Returns true if [`tighten`](Self::tighten) would lower the upper limit on the chain's slack. The slack is the
+    /// length by which the chain reaches beyond Rx.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the upper limit on the chain's slack if relays are too near the interferer. Returns true if the limit
-    /// was lowered.
+    /// Lowers the upper limit on the chain's slack if relays are too near the interferer. The slack is the length by
+    /// which the chain reaches beyond Rx. Returns true if the limit was lowered.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -172,14 +175,14 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the target SIR has reached its limit. The chain must then be compared with the upper bound of
-    /// all chains.
+    /// Returns true if the target SIR has reached its limit. The chain must then be compared with the upper bound on
+    /// the SIR of any chain.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the upper limit on the target SIR; returns the next action. Called if the chain meets the limit, but does
-    /// not reach the upper bound of all chains.
+    /// Raises the upper limit on the target SIR; returns the next action. Called if the chain meets the limit, but its
+    /// SIR does not reach the upper bound on the SIR of any chain.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -220,8 +223,8 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) is expected to change by less than `by`. The change follows from the slack and
-    /// the relays' moves.
+    /// Returns true if the slack and the expected gain of the moves are small. Each of them must change ln(target SIR)
+    /// by less than `by`.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least

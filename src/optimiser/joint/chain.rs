@@ -214,7 +214,7 @@ impl Gains {
     }
 
     /// Returns the gains of hop `k` for data toward Rx and toward Tx. `k` is 1 (hop from Tx) to N + 1 (hop to Rx), and
-    /// `relays` is N. `sent_by` returns a gain for the power of the relay with the given index.
+    /// `relays` is N. `sent_by` converts a gain to that for the transmit power of the relay with the given index.
     pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
         let there = match k {
             1 => self.from_tx,
