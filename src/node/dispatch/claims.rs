@@ -102,7 +102,8 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if all authentication sessions must restart with it; otherwise `None`.
+    /// Returns the new claim number if all authentication sessions must restart with it; otherwise `None`. Claim
+    /// numbers distinguish two nodes with one node number.
     ///
     /// The new sessions count their nonces from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {

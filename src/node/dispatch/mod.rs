@@ -56,7 +56,8 @@ mod timers;
 #[cfg(test)]
 mod tests;
 
-/// Claim to a node number that is sent back to its sender: side, destination node, and claim.
+/// Received claim that must be sent back: side and number of its sender, and the claim. A claim lets two nodes with one
+/// node number detect each other.
 pub(crate) type Echo = (Side, u16, Claim);
 
 #[derive(Clone, Debug)]
@@ -239,8 +240,8 @@ impl Node {
         self.layers.lease.until()
     }
 
-    /// Returns the start and end of this relay's time slots, as fractions of the frame. `None` without a valid
-    /// agreement, and if all slots have the same length.
+    /// Returns start and end of this relay's time slots, as fractions of the frame (all slots together). `None` without
+    /// a valid agreement, and if all slots have the same length.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         let void = self.layers.lease.has_lapsed() || self.layers.view.has_no_quorum();
         self.layers.round.slot_shares().filter(|_| !void)

@@ -134,7 +134,7 @@ impl Link {
     }
 }
 
-/// Losses of the links to the four nearest nodes on one side, nearest node first.
+/// Losses of the links to the four nearest nodes on one side of the relay, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
     /// Node that will be selected once it has been received without gaps for long enough. `None` if there is none.
@@ -248,8 +248,8 @@ impl Damping {
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if any link on this side has been lost repeatedly, at long intervals. The next loss of such a link
-    /// should be detected early.
+    /// Returns true if a link on this side of the relay has been lost repeatedly, at long intervals. The next loss of
+    /// such a link should be detected early.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -264,7 +264,7 @@ impl Damping {
         self.link(distance).is_some_and(|link| link.was_down)
     }
 
-    /// Returns a bit mask of the nodes whose links flap and must not be used. Bit 0 is the nearest node.
+    /// Returns a bit mask of the nodes whose links flap and must not be used. Bit 0 is the node nearest to this relay.
     pub(super) fn held_down_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
             .filter(|distance| self.is_held_down(*distance, now, settings))
@@ -277,7 +277,7 @@ impl Damping {
     }
 
     /// Records a frame of a candidate `distance` relays away. Returns true if this candidate has been received without
-    /// gaps for at least `probe_after` and at least `more`.
+    /// gaps for the longer of `probe_after` and `more`.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,
