@@ -38,7 +38,7 @@ use crate::time::{Duration, Instant, Jitter};
 /// long, and each relay needs up to thirty steps of its computation.
 const SLOW: u32 = 4;
 
-/// Number of retransmissions after which the wait no longer doubles.
+/// Number of retransmissions after which the wait for the reply no longer doubles.
 ///
 /// The wait after n retransmissions is 2 << n hop times, at most eight.
 const LOG_MOST: u32 = 2;

@@ -59,8 +59,8 @@ use crate::wire::session::{RAISED, Rival, Sender};
 /// Claims let two nodes with one node number detect each other.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Additional wait before the first unasked claim, after a start or after the relay was passive. A hundred relays need
-/// about this time for their first agreement.
+/// Additional wait before the first unasked claim to the node number. It applies after a start, and after the relay was
+/// passive. A hundred relays need about this time for their first agreement.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
 /// Longest of the doubled intervals between unasked claims. After an interval of this length, claims follow every
@@ -71,7 +71,8 @@ const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 /// [`least_interval`].
 const DEFENCES: u8 = 32;
 
-/// Number of claims that this relay sends after a frame with its own node number but without a claim.
+/// Number of claims to its node number that this relay sends after a frame with this number. The frame comes from a
+/// second node, and contains no claim.
 ///
 /// With signed frames: number of claims that this relay sends after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;

@@ -170,8 +170,8 @@ impl Damping {
     /// Records the loss of the link to the node `distance` relays away. If `counts` is false, because the channel loses
     /// many frames, only the loss of a flapping link counts.
     ///
-    /// If a different link on this side flaps, the lost link takes over the number of losses of that link. The reason
-    /// is that all links on one side cross the same gap in the chain.
+    /// If a different link on this side of the relay flaps, the lost link takes over the number of losses of that link.
+    /// The reason is that all links on one side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -227,8 +227,8 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the losses of all links on this side to those of the link lost last. These links were lost together,
-    /// because all of them cross the same gap in the chain.
+    /// Raises the losses of all links on this side of the relay to those of the link lost last. These links were lost
+    /// together, because all of them cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

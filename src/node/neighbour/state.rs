@@ -80,21 +80,21 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side of the relay that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
-    /// Selected neighbour, toward this relay, of each of the four nearest nodes on this side; 0 for none.
-    ///
-    /// The entry of the nearest node is the first.
+    /// Neighbours toward this relay that the four nearest nodes on one side of the relay have selected. 0 stands for no
+    /// neighbour. The entry of the nearest node is the first.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame on this side from a node that is not the neighbour. `None` if there was none.
+    /// Time of the last frame on this side of the relay from a node that is not the neighbour. `None` if there was
+    /// none.
     unselected_at: Option<Instant>,
-    /// Nodes on this side that this relay has recently received.
+    /// Nodes on this side of the relay that it has recently received.
     pub(super) hearing: Hearing,
     /// Number of consecutive hellos of each node that do not report reception of this relay.
     pub(super) not_received: ConsecutiveCounts,
     /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Bit 0 is the nearest node.
     reported_found: u8,
-    /// Nodes on this side whose mission or key this relay has recently refused.
+    /// Nodes on this side of the relay whose mission or key it has recently refused.
     refusals: Refusals,
-    /// Number of consecutive handshakes with a wrong key, for each node on this side.
+    /// Number of consecutive handshakes with a wrong key, for each node on this side of the relay.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
@@ -600,12 +600,12 @@ impl AgreedNodes {
         };
     }
 
-    /// Records that a view proposal was granted. The sender of the proposal is this side's neighbour in the view.
+    /// Records that a view proposal was granted. Its sender is the neighbour in the view, on this side of the relay.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
 
-    /// Records that a view proposal was granted with `node` as the neighbour on this side.
+    /// Records that a view proposal was granted with `node` as the neighbour on this side of the relay.
     pub(super) const fn agree(&mut self, node: u16) {
         self.in_view = node;
         self.counted = node;
@@ -651,12 +651,12 @@ impl Neighbour {
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
-    /// Returns true if this side's neighbour is linked, not lost, and nearer than `distance` relays.
+    /// Returns true if the neighbour on this side is linked, not lost, and nearer than `distance` relays.
     pub(crate) fn links_within(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
-    /// Returns true if this side's neighbour is linked, not lost, and farther than `distance` relays away.
+    /// Returns true if the neighbour on this side is linked, not lost, and over `distance` relays away.
     pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }

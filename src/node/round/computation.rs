@@ -88,7 +88,7 @@ pub(crate) struct Computation {
     /// in turn) that relay is the receiver of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Fitted time slots of this relay. Empty without the feature `altitude`.
+    /// Time slots of this relay that are as long as each hop needs. Empty without the feature `altitude`.
     pub(super) fitted: [FittedSlots; ALTITUDE as usize],
     /// Average of the interference measured at the agreed position. Used only if the interference is known as a
     /// function of x (a field).
@@ -395,10 +395,11 @@ pub(crate) enum LeaderTask {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
-    /// Number of completed rounds. The first pass of the token, in which no relay moves, does not count.
+    /// Number of completed rounds of Algorithm 2 (relays move in turn). The first pass of its token along the chain, in
+    /// which no relay moves, does not count.
     done: u16,
     turn: AdjustStep,
-    /// SIR of the chain's worst hop after the last round, linear.
+    /// SIR of the chain's worst hop after the last round of Algorithm 2 (relays move in turn), linear.
     pub(crate) sir: f32,
 }
 
@@ -420,8 +421,8 @@ impl Rounds {
         self.done
     }
 
-    /// Records the result of a pass of the token. Returns true if it was the last pass. `any` is true if any relay has
-    /// moved in this pass. `sir` is the SIR of the chain's worst hop, linear.
+    /// Records the result of a pass of Algorithm 2's token along the chain. Returns true if it was the last pass. `any`
+    /// is true if any relay has moved in this pass. `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -478,7 +479,7 @@ impl LeaderTask {
 #[derive(Clone, Debug)]
 pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
-    /// Checksum of the previous relay's data, by which duplicates are recognised; see [`fingerprint`].
+    /// Checksum of the previous relay's data; equal checksums show a duplicate. See [`fingerprint`].
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes of the joint method.
     pub(crate) chosen: bool,
@@ -663,9 +664,9 @@ pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
 /// State of one relay while the token of Algorithm 2 (relays move in turn) travels along the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Action of every relay in this pass of the token: look, move or stop.
+    /// Action of every relay in this pass of Algorithm 2's token: look, move or stop.
     pub(crate) turn: AdjustStep,
-    /// SIR of the chain's worst hop before this pass of the token, linear.
+    /// SIR of the chain's worst hop before this pass of Algorithm 2's token, linear.
     pub(crate) sir: f32,
     /// Position and power of the previous relay, which sends to this relay; `None` if Tx is the sender.
     pub(super) before: Option<HopEnd>,

@@ -14,8 +14,8 @@ const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 /// limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust (limit of the relays' moves) at which the final target of an improvement is predicted. With a smaller
-/// trust the predicted target would be too low.
+/// Minimum trust (limit of the relays' moves) at which the result of an improvement is predicted. The result is the
+/// chain's target. With a smaller trust the predicted target would be too low.
 const RESTRAINED: f32 = 0.05;
 
 /// Trust (limit of the relays' moves) below which the improvement of a chain is given up.
@@ -46,7 +46,8 @@ const CLOSE: f32 = 3e-6;
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of ln(target SIR) below which the final target of an improvement can be predicted.
+/// Expected increase of ln(target SIR) below which the result of an improvement can be predicted. The result is the
+/// chain's target SIR.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which a chain that falls far short of Rx counts as diverged.
@@ -111,8 +112,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. Targets are in ln(SIR),
-    /// never below `floor`.
+    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. The slack is the length by
+    /// which the chain reaches beyond Rx. Targets are in ln(SIR), never below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -195,7 +196,8 @@ impl Ascent {
     }
 
     /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. The sums are the
-    /// slack that the relays' moves are expected to add, and the change of slack per unit of ln(target SIR).
+    /// length that the relays' moves are expected to add beyond Rx (slack), and the change of slack per unit of
+    /// ln(target SIR).
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -279,8 +281,8 @@ impl Ascent {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current chain. `slack` is the trial chain's slack, m, at the
-    /// target `sigma`, as ln(SIR).
+    /// Returns true if a trial chain is better than the current chain. `slack` is the length by which the trial chain
+    /// reaches beyond Rx, m, at the target `sigma`, as ln(SIR).
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -304,7 +306,8 @@ impl Ascent {
     }
 
     /// Accepts the trial chain, and returns the next action. `share` is the fraction of their computed moves that the
-    /// relays made in the trial. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
+    /// relays made in the trial. `slack` is the length by which the chain reaches beyond Rx, m, at the target `sigma`,
+    /// in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -324,7 +327,7 @@ impl Ascent {
     }
 
     /// Returns the next action after the target of the unchanged chain was raised to `sigma`, in ln(SIR). `slack` is
-    /// the chain's slack at this target, m.
+    /// the length by which the chain reaches beyond Rx at this target, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

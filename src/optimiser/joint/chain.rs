@@ -254,15 +254,17 @@ pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
 /// Stored state of the solver for one segment, which is ten consecutive relays. It has the x of the last relay before
-/// the segment, and derivatives of the chain's slack. The derivatives are by the position of the segment's last relay.
+/// the segment, and derivatives of the chain's slack (length by which it reaches beyond Rx). The derivatives are by the
+/// position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the last relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
+    /// First derivatives of the chain's slack (length by which it reaches beyond Rx), m/m. They are by the x, y and h
+    /// of the segment's last relay.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's slack by the coordinates of the segment's last relay, 1/m. The order is xx,
-    /// xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack (length by which it reaches beyond Rx), 1/m. They are by the coordinates
+    /// of the segment's last relay. The order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 
