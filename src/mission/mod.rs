@@ -17,11 +17,11 @@ pub(crate) mod tests;
 /// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x between two relays, as a fraction of the distance from Tx to Rx. It is at least twice the spacing
-/// of f32 numbers near Rx, so that no two positions are equal.
+/// Smallest allowed step in x from one relay to the next, as a fraction of the distance from Tx to Rx. The step is at
+/// least twice the spacing of f32 numbers near Rx, so that no two positions are equal.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
-/// Maximum rounding error of a step in x, as a fraction of the distance from Tx to Rx.
+/// Maximum rounding error of the difference in x between two relays. The unit is the distance from Tx to Rx.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 /// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
@@ -39,39 +39,42 @@ pub struct MissionConfig {
     pub min_separation_m: f32,
     /// Transmit power of the ground transmitter, W: 1e-6 to 1e6.
     pub tx_power_w: f32,
-    /// Altitude and power of every relay whose settings have no profile.
+    /// Altitude and transmit power of every relay whose settings contain no profile. See
+    /// [`Settings::profile`](crate::Settings::profile).
     pub common: Profile,
     /// Range of altitudes, m, for methods that choose altitudes. Within 0.1 to 1e5; includes `common.altitude_m`.
     pub band: Band,
-    /// Range of lateral offsets y, m, for the joint method: within -1e5 to 1e5; includes 0.
+    /// Range of lateral offsets y for [`Method::Joint`](crate::Method::Joint), m. Within -1e5 to 1e5; includes 0.
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: of one transmitter at a known or unknown position, or a field. A field gives the
-    /// distribution of the interference for every x.
+    /// Interference on the hops: a transmitter at a known or unknown position, or an interference field. A field gives
+    /// the distribution of the interference for every x.
     pub interference: Interference,
     /// Noise power at the input of every receiver, W: 0 to 1. At most 1e12 times the interferer's power received at 1
-    /// m. 0 is the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
+    /// m. 0 means receivers without noise, as in the paper. Above 0, every SIR is the SINR: signal over interference
+    /// plus noise.
     pub noise_w: f32,
-    /// SIR that a hop needs from Rx to Tx, divided by the SIR that it needs from Tx to Rx: r, 0 to 1.
+    /// Ratio r of the SIR required for data from Rx to Tx to that for data from Tx to Rx: 0 to 1.
     ///
-    /// 0 means data from Tx to Rx only, as in the paper. Above 0, once the interference is known, a hop counts by the
-    /// lower of two values: the SIR toward Rx, and the SIR toward Tx divided by r.
+    /// 0 means data from Tx to Rx only, as in the paper. Above 0, once the interference is known, the value of a hop is
+    /// the lower of two: the SIR toward Rx, and the SIR toward Tx divided by r.
     pub reverse: f32,
     /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. It has no effect if `reverse` is
     /// 0.
     pub rx_power_w: f32,
-    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. If the gap is not 0, each time slot is as long as
-    /// its hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is log2(1 + SINR /
-    /// gap).
+    /// SNR gap of fitted slots (time slots as long as each hop needs), linear: 1 to 1000. 0 means slots of equal
+    /// length. With a gap above 0, [`Method::Joint`](crate::Method::Joint) maximises the data rate. The spectral
+    /// efficiency of a hop is log2(1 + SINR / gap).
     pub fitted_gap: f32,
-    /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain is accepted if its SIR is within this fraction of the best
-    /// SIR.
+    /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain of relays is accepted if the SIR of its worst hop is within
+    /// this fraction of the best possible value.
     pub tolerance: f32,
 }
 
 impl MissionConfig {
-    /// Checks the number of relays, and that they fit into the distance with their minimum separation.
+    /// Checks the number of relays, and that the relays fit between Tx and Rx. Adjacent relays need the minimum
+    /// separation, plus a margin for rounding.
     pub(super) const fn room(&self) -> Result<(), MissionError> {
         if self.relays < 1 || self.relays > MAX_RELAYS {
             return Err(MissionError::Relays);
@@ -116,8 +119,8 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// Together, relays with `min_separation_m` between neighbours need more than `distance_m`. This includes a
-    /// rounding margin of 5e-7 `distance_m` per relay.
+    /// The distance `distance_m` is too short for `relays` relays that are `min_separation_m` apart. The required
+    /// distance includes a rounding margin of 5e-7 `distance_m` per relay.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -173,7 +176,7 @@ error_texts!(MissionError {
     Tolerance => "tolerance must be within 1e-6 to 0.1",
 });
 
-/// Interferer on the ground (the paper's MSI): a jammer, a base station, a licensed user.
+/// Interferer on the ground (MSI in the paper), such as a jammer, a base station or a licensed user.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interferer {
@@ -208,8 +211,8 @@ pub enum Interference {
     Source(Interferer),
     /// Interference field: for every x, the distribution of the interference is known; its sources are not.
     Field(Field),
-    /// Single interfering transmitter at an unknown position. Relays spread evenly until they know it
-    /// ([`crate::Settings::listen`]).
+    /// Single interfering transmitter at an unknown position. The relays spread evenly until they have estimated the
+    /// interference ([`crate::Settings::listen`]).
     Unknown,
 }
 
@@ -310,19 +313,22 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a drone-to-drone hop per watt of the sender's power; see [`Mission::relay_gain`]. With one interferer
-    /// the gain is eta / (`mu_los` `p_MSI`), 1/W. eta and `mu_los` are the path-loss factors drone to ground and drone
-    /// to drone, and `p_MSI` is the interferer's power. In an interference field the gain is `Upsilon_max` / `mu_los`,
-    /// m^2/W.
+    /// Gain of a drone-to-drone hop per watt of the sender's power; see [`Mission::relay_gain`].
+    ///
+    /// With one interferer of power `p_MSI` the gain is eta / (`mu_los` `p_MSI`), 1/W. In an interference field it is
+    /// `Upsilon_max` / `mu_los`, m^2/W, with the field's largest E[1/I]. eta is the path-loss factor drone to ground,
+    /// `mu_los` that drone to drone.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's power,
-    /// divided by the squared distance.
+    /// Gain of the last hop (to Rx) per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the
+    /// sender's power, divided by the squared distance.
     ///
     /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
-    /// field it is Upsilon(D) / eta. With noise, the interference at Rx includes the noise.
+    /// field it is E[1/I] at Rx, divided by eta. eta is the path-loss factor drone to ground, `mu_nlos` that from the
+    /// interferer to Rx. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,
-    /// Receiver noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. It is 0 without
-    /// noise and for a mission with an interference field.
+    /// Receiver noise divided by the interferer's power received at 1 m, 1/m^2. This is nu = N eta / `p_MSI`, with the
+    /// noise N, the path-loss factor eta and the interferer's power `p_MSI`. It is 0 without noise, and in an
+    /// interference field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -331,7 +337,7 @@ pub struct Mission {
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
-    /// Maximum number of relays of a mission. Frames on the wire have room for more: node numbers up to 4094.
+    /// Maximum number of relays of a mission. The frames on the wire allow node numbers up to 4094.
     pub const MAX_RELAYS: u16 = MAX_RELAYS;
 
     /// Creates a mission after checking every parameter.
@@ -572,16 +578,16 @@ impl Mission {
     }
 
     /// Returns the receiver noise divided by the interferer's power received at 1 m, 1/m^2. This is nu = N eta /
-    /// `p_MSI`.
+    /// `p_MSI`, with the noise N, the path-loss factor eta drone to ground and the interferer's power `p_MSI`.
     ///
-    /// The result is 0 without noise. It is also 0 in an interference field, because Upsilon of the field includes
-    /// the noise.
+    /// The result is 0 without noise. It is also 0 in an interference field, because the field's mean inverse
+    /// interference (Upsilon) includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
         if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
-    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. r is 0 for data
-    /// from Tx to Rx only.
+    /// Returns r: the SIR required for data from Rx to Tx, divided by that for data from Tx to Rx. r is 0 for data from
+    /// Tx to Rx only.
     ///
     /// While the interferer is unknown r is 0, because relays then spread evenly. Without the feature `reverse` the
     /// function returns a constant, so that the compiler drops the code for two directions.
@@ -593,8 +599,9 @@ impl Mission {
         }
     }
 
-    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, because
-    /// relays then spread evenly. Without the feature `altitude` the function returns a constant.
+    /// Returns the SNR gap of fitted slots (as long as each hop needs), linear; 0 for equal slots. It is 0 while the
+    /// interferer is unknown, because relays then spread evenly. Without the feature `altitude` the function returns a
+    /// constant.
     pub const fn fitted_gap(&self) -> f32 {
         if ALTITUDE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.fitted_gap
@@ -648,9 +655,10 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the gain A of the first hop. The SIR of this hop is A times the inverse interference
+    /// Returns the gain A of the first hop (from Tx). The SIR of this hop is A times the inverse interference
     /// ([`crate::sir::quiet`]), divided by the squared length. With one interferer A is the power of Tx divided by the
-    /// power of the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
+    /// power of the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` / eta times the field's largest
+    /// E[1/I] (`Upsilon_max`). eta is the path-loss factor drone to ground.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
@@ -722,13 +730,14 @@ impl Mission {
     /// are those whose positions are computed after the position of relay `index`.
     ///
     /// Farthest means toward Rx, or toward Tx with an interference field. `across_squared` is the largest squared
-    /// distance, in y and altitude, between two neighbours among those later relays, m^2. It reduces their steps in x.
+    /// distance, in y and altitude, between two neighbours among the later relays, m^2. A larger value allows smaller
+    /// steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, without room for the separation of later relays. Later
-    /// relays are those whose positions are computed after the position of relay `index`.
+    /// Returns the farthest allowed x of relay `index`, m, if later relays need no separation in x. Later relays are
+    /// those whose positions are computed after the position of relay `index`.
     ///
     /// Farthest means toward Rx, or toward Tx with an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
@@ -748,7 +757,7 @@ impl Mission {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index`, m, if the relays between it and Rx can share one x.
+    /// Returns the largest x of relay `index`, m, if the relays nearer to Rx need no separation in x.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }
@@ -790,11 +799,11 @@ impl Mission {
         }
     }
 
-    /// Returns the mission with this `interference` instead of its own.
+    /// Returns this mission with `interference` in place of its configured interference.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
-    /// `halved` has a flag for the first hop and a flag for the last hop. A hop with a true flag becomes half as long
-    /// as the inner hops.
+    /// `halved` has two flags: for the first hop (from Tx) and for the last hop (to Rx). A true flag makes its hop half
+    /// as long as the inner hops.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.

@@ -34,11 +34,11 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays that forward the message compute first. Such messages are twice as
+/// Factor on the wait for a reply if each relay computes before it forwards the message. Such messages are twice as
 /// long, and each relay needs up to thirty steps of its computation.
 const SLOW: u32 = 4;
 
-/// Number of retransmissions after which the wait no longer doubles.
+/// Number of retransmissions after which the wait for the reply no longer doubles.
 ///
 /// The wait after n retransmissions is 2 << n hop times, at most eight.
 const LOG_MOST: u32 = 2;
@@ -66,7 +66,7 @@ pub(crate) enum Stage {
     Cancelled,
 }
 
-/// Reply to a message from the previous relay.
+/// Reply of this relay to a message that the previous relay has sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Reply {
     /// The message is completed. The reply contains its result.
@@ -83,7 +83,7 @@ pub(crate) struct Path {
     pub(crate) hop_time: Duration,
     /// Number of hops on the path.
     pub(crate) hops: u16,
-    /// True if the relays of these hops compute before they forward the message.
+    /// True if each relay on the path computes before it forwards the message.
     pub(crate) slow: bool,
 }
 
@@ -103,7 +103,8 @@ pub(crate) struct Circulation {
     is_lossy: bool,
     /// Number of later messages for which the channel still counts as lossy.
     lossy_messages: u8,
-    /// Number of repetitions of the reply still to be sent without a request, because the channel is lossy.
+    /// Number of unasked repetitions of the reply still to be sent. The channel is lossy, and the reply is repeated
+    /// even if no duplicate of the message arrives.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
@@ -198,8 +199,8 @@ impl Circulation {
 
     /// Cancels the message: it counts as completed, without a result.
     ///
-    /// The time of its transmission is discarded. Otherwise a later message could count as the reply, and would wrongly
-    /// prove that the neighbour is alive.
+    /// The time at which the message was sent is discarded. Otherwise a later message of the neighbour could count as
+    /// the reply to this message, and would wrongly prove that the neighbour is alive.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }

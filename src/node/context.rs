@@ -12,7 +12,8 @@ use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// Mission that this relay flies now. The mission has as many relays as the current view has members.
+    /// Mission that this relay flies now. The number of its relays is the number of members of the accepted view (list
+    /// of the chain's members).
     pub(crate) mission: Mission,
     /// Interference as configured in the active mission, not as estimated from measurements.
     pub(crate) interference: Interference,
@@ -47,8 +48,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank, and the number of relays in the mission loaded before flight. Rank 1 is the leader.
-    /// View changes alter neither number.
+    /// Returns this relay's rank in the mission loaded before flight, and the number of relays in it. Rank 1 is that of
+    /// the leader. View changes alter neither number.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -166,8 +167,8 @@ impl<'a> Context<'a> {
 /// lease.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Upper bound of the remaining lease time of the other members of this view. This relay knows it, because every
-    /// lease renewal passes through it.
+    /// Upper bound of the remaining lease time of the other members of `view`. This relay knows the bound, because
+    /// every lease renewal passes through it.
     pub(crate) lease_left: Duration,
     /// View that this relay accepted last.
     pub(crate) view: ViewId,
@@ -207,7 +208,7 @@ pub(crate) struct Effects {
     pub(crate) ignored: Option<Ignored>,
     /// True if this step scheduled a retransmission of a message.
     pub(crate) resent: bool,
-    /// True if this step started a message along the chain or a view proposal.
+    /// True if this step started a view proposal, or a new message along the chain.
     pub(crate) began: bool,
     /// True if this step has found that a new view (list of the chain's members) is needed.
     pub(crate) view_needed: bool,
@@ -237,14 +238,14 @@ pub(crate) enum Peer {
     Previous,
 }
 
-/// Result of one protocol layer that is handled as an event.
+/// Event in the result of one protocol layer's step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
     /// The relays of the chain have all agreed on their positions.
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
-    /// The lease has expired, so relays of a later view may already use other positions.
+    /// Expiry of this relay's lease. Relays of a later view may already use different positions.
     Lapsed,
     /// The next hello to the neighbour toward the leader must request a new view.
     RequestView,
@@ -272,7 +273,8 @@ pub(crate) enum ProposalOutcome {
     ///
     /// Its positions may be used after `usable_in` tenths of a second, when older leases have ended.
     Granted { relays: u16, usable_in: u16 },
-    /// An earlier decision on a different view is accepted instead. The leader then proposes a view that follows it.
+    /// An earlier decision on a different view is accepted instead. The leader then proposes a successor of the
+    /// accepted view.
     Superseded,
     /// Rejected: too few relays are reachable for a quorum.
     NoQuorum,
@@ -334,7 +336,7 @@ impl Effects {
     }
 }
 
-/// Pause between two steps of a long computation. The firmware's main loop can do other work in it.
+/// Pause between two steps of a long computation. During the pause the firmware's main loop can do other work.
 pub(crate) const PAUSE: Duration = Duration::from_micros(250);
 
 /// Maximum duration of a lease, in units of `dead_after`.

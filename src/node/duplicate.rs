@@ -59,30 +59,32 @@ use crate::wire::session::{RAISED, Rival, Sender};
 /// Claims let two nodes with one node number detect each other.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Additional wait before the first unasked claim, after a start or after the relay was passive. A hundred relays need
-/// about this time for their first agreement.
+/// Additional wait before the first unasked claim to the node number. It applies after a start, and after the relay was
+/// passive. A hundred relays need about this time for their first agreement.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum of the doubled intervals between unasked claims. Later claims follow every `dead_after`.
+/// Longest of the doubled intervals between unasked claims. After an interval of this length, claims follow every
+/// `dead_after`. Claims let two nodes with one node number detect each other.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
 /// Number of claims that this relay sends in answer to a claim of a duplicate. The interval between them is
 /// [`least_interval`].
 const DEFENCES: u8 = 32;
 
-/// Number of claims that this relay sends after a frame with its own node number but without a claim.
+/// Number of claims to its node number that this relay sends after a frame with this number. The frame comes from a
+/// second node, and contains no claim.
 ///
 /// With signed frames: number of claims that this relay sends after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
 
-/// Returns the minimum interval between claims of this relay. Without this limit, the claims of two relays and their
-/// echoes could fill the channel.
+/// Returns the minimum interval between this relay's claims to its node number. Without this limit, the claims of two
+/// relays with one number, and the echoes of these claims, could fill the channel.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Returns the interval between claims of a passive relay: a quarter of `probe_after`. A passive relay sends many
-/// claims before it becomes active again, so the loss of a few claims does no harm.
+/// Returns the interval between a passive relay's claims to its node number. It is a quarter of `probe_after`. A
+/// passive relay sends many claims before it becomes active again, so the loss of a few claims does no harm.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
@@ -106,9 +108,9 @@ pub(crate) struct IndexClaims {
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while this relay is active.
     passive_until: Option<Instant>,
-    /// Time of the next unasked claim; `None` if none is scheduled.
+    /// Time of this relay's next unasked claim to its node number; `None` if none is scheduled.
     next_claim: Option<Instant>,
-    /// Interval between the next unasked claim and the one after it.
+    /// Interval between the next unasked claim to the node number and the claim after it.
     interval: Duration,
     /// Number of claims still to be sent against a duplicate of this relay's node number. The interval between them is
     /// [`least_interval`].
@@ -116,7 +118,7 @@ pub(crate) struct IndexClaims {
     /// Earliest time at which the next claim may be scheduled. This limits the rate of Claim messages.
     quiet_until: Instant,
     claim_due: bool,
-    /// True if all authentication sessions must be restarted, because the claim number has changed.
+    /// True if all authentication sessions must be restarted with this relay's present claim number.
     sessions_due: bool,
     jitter: Jitter,
 }
@@ -328,8 +330,9 @@ impl IndexClaims {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns this relay's claim number if it must restart its authentication sessions; otherwise `None`. A relay that
-    /// has raised its claim number restarts its sessions with the new number.
+    /// Returns this relay's claim number if it must restart its authentication sessions; otherwise `None`. Claim
+    /// numbers distinguish two nodes with one node number. A relay that has raised its claim number restarts its
+    /// sessions with the new number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }

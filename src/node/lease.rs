@@ -73,7 +73,8 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Latest possible end of other members' leases that this relay's part in renewals has extended.
+    /// Latest possible end of the other members' leases, as far as this relay has extended them. Each lease renewal
+    /// that this relay completes extends the leases of all members.
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which its agreed positions may be used.
     accepted: (ViewId, Instant),
@@ -144,7 +145,8 @@ impl Lease {
         }
     }
 
-    /// Sets this relay's requests to the leader: to leave, its spare, and the report that it is in place.
+    /// Sets the requests that this relay sends to the leader in its replies to lease renewals. They are the relay's
+    /// wish to leave, a spare (relay outside of the chain), and the report that the relay is in place.
     pub(crate) fn set_requests(&mut self, requests: Requests) {
         if let Some(departures) = self.departures.first_mut() {
             departures.requests = requests;
@@ -162,12 +164,12 @@ impl Lease {
 
     /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
-    /// A relay is ordered to leave once two consecutive renewals reported all relays in place. By then the relay that
-    /// left last knows that all relays are in place. If there is a spare, the spare joins first. No spare is called if
-    /// the view already has more relays than before the request.
+    /// A relay is ordered to leave once two consecutive renewals reported all relays in place. By then a relay
+    /// that left the chain earlier knows that all relays are in place. If there is a spare, the spare joins first. No
+    /// spare is called if the view already has more relays than before the request.
     ///
-    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease. No relay waits
-    /// for the order longer than this maximum duration, or than its remaining endurance. So at least half of the
+    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease. A relay waits for
+    /// its order to leave at most this maximum duration, and at most its remaining endurance. So at least half of the
     /// endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
@@ -211,7 +213,7 @@ impl Lease {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }
 
-    /// Returns the lease's expiry time; `None` without a lease or after its expiry.
+    /// Returns the time at which this relay's lease expires; `None` if it has no lease.
     pub(crate) const fn until(&self) -> Option<Instant> {
         match self.state {
             LeaseState::Until(at) => Some(at),
@@ -219,7 +221,7 @@ impl Lease {
         }
     }
 
-    /// Returns true from the lease's expiry until the next view.
+    /// Returns true from the expiry of this relay's lease until the next view.
     pub(crate) const fn has_lapsed(&self) -> bool {
         matches!(self.state, LeaseState::Lapsed)
     }
@@ -246,13 +248,13 @@ impl Lease {
         }
     }
 
-    /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before `rest`.
+    /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before the time `rest`.
     ///
     /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
     /// that lease ends by `vouched_until`, because no renewal completes without all members.
     ///
     /// The age of an outstanding renewal counts as a round trip only if this relay was a member of `base` and `lost` is
-    /// false. If a relay is lost (`lost` is true), the age is that of the outage.
+    /// false. If a relay is lost (`lost` is true), the age is the duration of the outage.
     pub(crate) fn accept_view(
         &mut self,
         now: Instant,
@@ -271,7 +273,7 @@ impl Lease {
         self.end();
     }
 
-    /// Ends the lease. The next one requires an agreement on positions in a later view.
+    /// Ends this relay's lease. The next lease requires an agreement on positions in a later view.
     pub(crate) fn end(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
@@ -288,8 +290,8 @@ impl Lease {
 
     /// Returns the time at which this view's first renewal turned at the last relay; `None` if unknown.
     ///
-    /// Each relay takes it as the middle between its forwarding of the renewal and its reception of the reply, so that
-    /// all relays know about the same time, without a common clock. `None` until it is known.
+    /// Each relay takes the middle between its forwarding of the renewal and its reception of the reply. So all relays
+    /// obtain nearly the same time, without a common clock.
     pub(crate) fn turned_at(&self) -> Option<Instant> {
         self.departures.first()?.turned_at
     }
@@ -355,11 +357,11 @@ impl Lease {
         effects
     }
 
-    /// Extends this relay's lease after the renewal `pulse`. All members took part in this renewal. The lease ends when
-    /// the duration in `pulse` has passed since this relay forwarded it.
+    /// Extends this relay's lease after the completed renewal `pulse`, in which all members took part. The lease ends
+    /// when the duration in `pulse` has passed since this relay forwarded it.
     ///
-    /// The first lease in a view is not granted if `next` is more than twice the duration in `pulse`. It would expire
-    /// before the next renewal, with the duration `next`, completes.
+    /// `next` is the lease duration in the next renewal, in tenths of a second. The first lease in a view is not
+    /// granted if `next` is more than twice the duration in `pulse`. It would expire before the next renewal completes.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {

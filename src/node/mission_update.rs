@@ -467,9 +467,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the exceeded limit.
     ///
-    /// The length of a mission with its own Tx and Rx positions (`sited`) is not limited. Where this relay's fixed
-    /// altitude limits the geofence, the altitude limit of the loaded mission counts instead, so that all relays decide
-    /// alike.
+    /// The distance from Tx to Rx is not limited if the mission has its own Tx and Rx positions (`sited`). If this
+    /// relay's fixed altitude equals an altitude limit of the geofence, the limit of the loaded mission counts in its
+    /// place. So all relays decide alike.
     fn encloses(
         &self,
         member: &Member,

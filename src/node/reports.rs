@@ -49,7 +49,8 @@ const UNCONFIRMED: Duration = Duration::from_millis(3000);
 /// reports.
 const MOST_DOUBLINGS: u8 = 3;
 
-/// Value of `Watched::unconfirmed` while the relay four numbers away reports to the station itself.
+/// Value of `Watched::unconfirmed` while the far relay sends its reports directly to the station. The far relay has a
+/// node number four farther from the station than this relay.
 const DIRECT: u8 = MOST_DOUBLINGS + 1;
 
 /// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
@@ -69,8 +70,7 @@ const ENGAGED: u16 = State::Engaged as u16 + 1;
 /// share of the data rate allows them.
 const AHEAD: Duration = Duration::from_millis(2_000);
 
-/// Minimum time between the states in two entries of one relay. An entry is the state of a relay in a report. This
-/// time is longer than [`ROUNDING`].
+/// Minimum time between two successive states that a relay reports about itself. This time is longer than [`ROUNDING`].
 const STEP: Duration = Duration::from_millis(500);
 
 /// Maximum time difference between two copies of an entry (relay's state) that came by different ways. The copies
@@ -96,7 +96,8 @@ const STORED: usize = 16;
 /// Length of a report without its entries, including frame and tag, bytes.
 const FRAME: u32 = 32;
 
-/// Assumed length of an entry (relay's state) in a report, bytes. It includes a part of the frame and of the details.
+/// Assumed length of an entry (relay's state) in a report, bytes. It includes a part of the report's frame, and a part
+/// of the details (additional state of one relay).
 const SHARE: u32 = 24;
 
 /// Reports of this relay, and the reports of other relays that it forwards to a ground station.
@@ -104,11 +105,11 @@ const SHARE: u32 = 24;
 pub(crate) struct Reporting {
     /// Last position of the drone and the time of its measurement; `None` if unknown.
     position: Option<(Instant, Placement)>,
-    /// Control state of the drone, from 1; 0 without an autopilot.
+    /// Control state of the drone, as numbered in reports; 0 without an autopilot.
     control: u16,
     /// Last measured interference, W; 0 without a measurement.
     power_w: f32,
-    /// Time of the state in the last entry that this relay sent about itself.
+    /// Time of the state that this relay last reported about itself.
     reported: Instant,
     stored: Vec<Stored, STORED>,
     watched: [Watched; 2],
@@ -123,16 +124,17 @@ struct Stored {
     detail: Option<Detail>,
     /// Time at which the relay was in the state of this entry.
     at: Instant,
-    /// Earliest time at which the entry may be sent. When the entry is sent, this time is set so late that a newer
-    /// entry usually replaces the entry before.
+    /// Earliest time at which the entry may be sent. When the entry is sent, this time is set one period later. By then
+    /// a newer entry has usually replaced this entry.
     from: Instant,
     rank: Rank,
 }
 
-/// Order in which stored entries (relays' states) are sent: the last rank first.
+/// Order in which stored entries (relays' states) are sent: `Alarm`, `New`, `Sent`, `Detailed`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Rank {
-    /// The entry was sent with its details. They are not sent again, even if a copy with them arrives by another way.
+    /// The entry was sent with its details (additional state of the relay). The details are not sent again, even if a
+    /// copy of the entry with details arrives by a different way.
     Detailed,
     /// The entry was sent without details.
     Sent,
@@ -157,9 +159,11 @@ struct Watched {
     /// distances from this relay.
     hand_on: u8,
     hand_on_at: Instant,
-    /// Time of the last report of the relay four numbers farther, or of its last frame to the station.
+    /// Time of the last report of the far relay, or of the last frame of that relay to the station. The far relay has a
+    /// node number four farther from the station than this relay.
     ///
-    /// `unconfirmed` is `DIRECT` after such a frame, else it counts the Watches sent to that relay since then.
+    /// `unconfirmed` is `DIRECT` after a frame to the station. Otherwise it counts the Watches (requests for reports)
+    /// sent to the far relay since this time.
     confirmed: Instant,
     unconfirmed: u8,
     /// Node to which a handshake must be sent that requests a reply; `None` if there is none.
@@ -180,8 +184,8 @@ struct Watched {
     stores_alarm: bool,
 }
 
-/// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), its [refusals](Entry::refusal) toward Tx and toward Rx, the setpoint, and the agreed position.
+/// State that this relay reports about itself. The values are: its combined state (as in an entry, without the control
+/// state), its [refusals](Entry::refusal) toward Tx and toward Rx, its setpoint, and its agreed position.
 pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
 impl Reporting {
@@ -203,12 +207,13 @@ impl Reporting {
         self.schedule(member, begins_alarm(before, control));
     }
 
-    /// Records that a node was refused for another mission. The report about it is sent ahead of its turn.
+    /// Records that a node with a wrong mission or key was refused. The report about it is sent early.
     pub(crate) fn handle_refusal(&mut self, member: &Member) {
         self.schedule(member, true);
     }
 
-    /// Schedules this relay's entry for a change. `begins` is true if the change begins an alarm.
+    /// Schedules this relay's entry (its state in a report), because its state has changed. `begins` is true if the
+    /// change begins an alarm.
     fn schedule(&mut self, member: &Member, begins: bool) {
         let is_spread = begins && matches!(member.settings.wiring, Wiring::Shared);
         let sides = [Side::Upstream, Side::Downstream];
@@ -384,7 +389,8 @@ const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
     }
 }
 
-/// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one. `None` while there is neither.
+/// Returns the neighbour at `side`, or Tx for relay 1 and Rx for relay N without a neighbour. `None` while there is
+/// neither a neighbour nor a ground station.
 fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
     let end = beyond(member, side, 1);
     match neighbours.at(side).node() {
@@ -668,9 +674,9 @@ impl Reporting {
     /// Returns the time between two reports, divided by the length of the first report in bytes. With this time the
     /// reports of all relays take an eleventh of the data rate.
     ///
-    /// The data rate is assumed to be one sweep in each `hop_time`. On a shared channel it is also at least 2350 bytes
-    /// for each relay in each `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). The reports use a tenth of these
-    /// bytes, divided among the relays in proportion to their loads.
+    /// The data rate is assumed to be one `Sweep` message in each `hop_time`. On a shared channel it is also at least
+    /// 2350 bytes for each relay in each `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). The reports use a
+    /// tenth of these bytes, divided among the relays in proportion to their loads.
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
         let hop = (settings.hop_time.as_micros() * 108 / 1_200).clamp(1, 1 << 24);
@@ -728,8 +734,8 @@ fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     byte.times(bytes).max(LEAST_PERIOD)
 }
 
-/// Returns the age at `now` of a state of the time `at`, in tenths of a second, rounded. It includes 20 ms for the
-/// transmission.
+/// Returns the age at `now` of a state that existed at the time `at`, in tenths of a second, rounded. The age includes
+/// 20 ms for the transmission.
 fn age(now: Instant, at: Instant) -> u8 {
     let tenths = micros(now.since(at)).saturating_add(70_000) / 100_000;
     u8::try_from(tenths).unwrap_or(u8::MAX)

@@ -27,18 +27,18 @@ pub(crate) struct Steering {
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
-/// Motion to a new agreed position: start, duration, time of the next step, part of the way.
+/// Motion to a new agreed position: start, duration, time of the next step, and completed fraction.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     since: Instant,
     span: Duration,
     at: Instant,
     done: f32,
-    /// True while the common begin is not known yet.
+    /// True until the common start time of all relays of the view is known.
     waits: bool,
 }
 
-/// Longest wait for the common begin of a motion.
+/// Longest wait until the common start time of the relays' motions is known.
 const WAIT: Duration = Duration::from_millis(15_000);
 
 /// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that they arrive together.
@@ -59,10 +59,11 @@ impl Way {
         motion: None,
     };
 
-    /// Returns the position to fly to at `now`; `None` without an agreed position. If the agreed position `agreed` has changed, the
-    /// position to fly to moves there in 32 steps within the time `span`.
+    /// Returns the position to fly to at `now`; `None` without an agreed position. If the agreed position `agreed` has
+    /// changed, the position to fly to moves there in 32 steps within the time `span`.
     ///
-    /// The motion begins at `begin`, the same time at all relays of the view, or after [`WAIT`] if it is not known before.
+    /// The motion begins at `begin`, the same time at all relays of the view. If `begin` stays `None`, the motion
+    /// begins after [`WAIT`].
     fn advance(
         &mut self,
         now: Instant,
@@ -142,7 +143,8 @@ impl Steering {
         way: [Way::NONE; DEPARTURES as usize],
     };
 
-    /// Creates the guard, if `settings` request a guard. `neighbours` are the node numbers on the two sides.
+    /// Creates the guard (collision avoidance), if `settings` request a guard. `neighbours` are the node numbers on the
+    /// two sides.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,
@@ -155,7 +157,7 @@ impl Steering {
         self.guard = config.map(|config| Guard::new(config, neighbours, seed, now));
     }
 
-    /// Returns the guard; `None` without one.
+    /// Returns the guard (collision avoidance); `None` if this relay has no guard.
     pub(crate) fn known_guard(&self) -> Option<&Guard> {
         self.guard.as_ref().filter(|_| GUARD)
     }
@@ -278,9 +280,9 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air. `others` is true if
-    /// some relays of the view at this side are not lost. Until the guard has received a message of one of these relays, it does not move
-    /// the setpoint toward this side.
+    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air.
+    /// `others` is true if some relays of the view at this side are not lost. Until the guard has received a message of
+    /// one of these remaining relays, it does not move the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);

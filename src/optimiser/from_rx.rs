@@ -73,8 +73,8 @@ impl FromRx {
 
     /// Returns the margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
     ///
-    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. The margin is a continuous
-    /// function of `target`.
+    /// D is the distance from Tx to Rx. The required SIR is `target` times the mission's ratio `reverse`. The margin is
+    /// below 0 if the hop misses the required SIR. The margin is a continuous function of `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -83,8 +83,8 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx well enough. `None` if there
-    /// is no such x. The SIR from Rx must miss `target` at `x_m`.
+    /// Returns the largest x in [`least_m`, `x_m`], m, at which the hop from Rx has the required SIR. The required SIR
+    /// is `target` times the mission's ratio `reverse`. At `x_m` the SIR must be lower. `None` if there is no such x.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;

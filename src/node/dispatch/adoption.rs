@@ -90,8 +90,8 @@ impl Node {
 
     /// Replaces the active mission by the stored `mission` with the identifier `id`. `now` is `None` after a start.
     ///
-    /// If the new mission has other positions of Tx and Rx, all relay positions become invalid: the relay has no
-    /// setpoint until the next agreement, and the guard (collision avoidance) restarts.
+    /// If the positions of Tx and Rx differ from those of the previous mission, all relay positions become invalid. The
+    /// relay then has no setpoint until the next agreement, and the guard (collision avoidance) restarts.
     pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.interference = *mission.interference();

@@ -87,7 +87,8 @@ impl Node {
         Some((side, to, Message::Claim(claim)))
     }
 
-    /// Returns the node to which a claim must be sent, and marks the claim as sent. `None` if no claim is due.
+    /// Returns the node to which a claim must be sent, and marks the claim as sent. `None` if no claim is due. Claims
+    /// let two nodes with one node number detect each other.
     ///
     /// The two neighbours receive claims alternately. On a shared channel, a relay without neighbours addresses its
     /// claims to its own number, so that a second node with that number receives them.
@@ -102,7 +103,8 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if all authentication sessions must restart with it; otherwise `None`.
+    /// Returns the new claim number if all authentication sessions must restart with it; otherwise `None`. Claim
+    /// numbers distinguish two nodes with one node number.
     ///
     /// The new sessions count their nonces from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {

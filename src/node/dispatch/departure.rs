@@ -28,8 +28,9 @@ use crate::wire::message::{Hello, Requests};
 /// Maximum distance of a drone in place from its setpoint along x, y and altitude, m.
 const IN_PLACE_M: f32 = 3.0;
 
-/// Time after which an ordered departure counts as blocked, in units of `dead_after`. The reason is that the two
-/// neighbours do not receive each other. The departure is requested once more after the same time.
+/// Time after which an ordered departure counts as blocked, in units of `dead_after`. A departure is blocked if the
+/// neighbours of the relay that leaves do not receive each other. The departure is requested again after twice this
+/// time.
 const BLOCKED_AFTER: u32 = 4;
 
 /// State of a relay that leaves the chain or waits outside of it.
@@ -41,16 +42,17 @@ pub enum Departure {
     Member,
     /// Departure requested: the relay holds its place until the leader's order.
     Requested,
-    /// Departure refused: without a guard the neighbours fly close to the drone that still holds its place. See
-    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard).
+    /// Departure refused, because this relay has no guard (collision avoidance). The neighbours would fly close to this
+    /// drone, which still holds its place. See [`Settings::leave_without_guard`](crate::Settings::leave_without_guard).
     NeedsGuard,
-    /// Departure refused: over two wires per relay the neighbours do not receive each other.
+    /// Departure refused: with a separate link to each neighbour, the neighbours do not receive each other. See
+    /// [`Wiring::Pair`](crate::Wiring::Pair).
     NeedsChannel,
-    /// Departure refused for now: the remaining relays would have no quorum, or there are none.
+    /// Departure refused for now: no relay would remain, or the remaining relays would have no quorum.
     NeedsQuorum,
-    /// Departure refused for now: the numbers of the two neighbours differ by more than four.
+    /// Departure refused for now: the node numbers of this relay's neighbours differ by more than four.
     WideGap,
-    /// Departure refused for a minute: the two neighbours have not selected each other.
+    /// Departure refused for a minute: this relay's two neighbours have not selected each other.
     Blocked,
     /// Spare outside of the chain, which the leader may call.
     Spare,
@@ -69,9 +71,10 @@ pub(crate) struct Leaving {
     lasts_until: Option<Instant>,
     /// Time at which this relay went outside of the chain; `None` while it is inside.
     outside_since: Option<Instant>,
-    /// True for each side at which the chain ended with this relay when it went outside.
+    /// True for each side (toward Tx, toward Rx) at which this relay was the end of the chain. The values are those of
+    /// the time at which the relay went outside of the chain.
     ended: [bool; 2],
-    /// True for each side whose neighbour has selected the relay beyond this relay.
+    /// True for each side whose neighbour has selected a different node in place of this relay.
     passed: [bool; 2],
     /// True if this relay is a spare. Remains true if the spare requests to leave.
     spare: bool,
@@ -91,8 +94,8 @@ pub(crate) struct Leaving {
     /// Relay outside of the chain, at this side, that must be informed when it is allowed to leave. `None` if there is
     /// none.
     waiting: Option<(Side, u16)>,
-    /// Relays that are allowed to leave, and that were reported to the firmware. One bit mask for each side, with a bit
-    /// for each distance.
+    /// Relays that are allowed to leave, and that were reported to the firmware. One bit mask for each side of this
+    /// relay; bit 0 is the nearest node.
     told: [u8; 2],
 }
 
@@ -110,7 +113,7 @@ impl Leaving {
         self.outside_since.is_some()
     }
 
-    /// Returns true if this relay waits outside of the chain until it is called.
+    /// Returns true if this relay waits outside of the chain until the leader calls it.
     pub(crate) const fn is_spare(&self) -> bool {
         self.spare && !self.requested
     }
@@ -119,13 +122,13 @@ impl Leaving {
         self.place = Some(place);
     }
 
-    /// Records the adoption of a view: an order from the previous view has ended.
+    /// Records the adoption of a view: the order to leave, given in the previous view, has ended.
     pub(crate) const fn end_order(&mut self) {
         self.ordered_at = None;
         self.passed = [false; 2];
     }
 
-    /// Returns the spare that a member of the chain receives through this relay; 0 for none.
+    /// Returns the spare (relay that waits outside) that this relay has recently received; 0 for none.
     fn spare(&self, now: Instant, settings: &Settings) -> u16 {
         let known = self
             .heard_spare
@@ -228,8 +231,8 @@ impl Node {
         }
     }
 
-    /// Returns true until this relay has taken part in the protocol. For the first leader this ends when it starts a
-    /// pass.
+    /// Returns true until this relay has taken part in the protocol. The initial leader takes part as soon as it starts
+    /// its first message along the chain.
     fn is_untouched(&self) -> bool {
         let Layers { round, view, .. } = &self.layers;
         let is_loaded = self.member.view == ViewId::LOADED && view.outstanding().is_none();
@@ -252,7 +255,8 @@ impl Node {
         true
     }
 
-    /// Returns true if this relay cannot leave the chain with its settings: it has no guard, or two wires.
+    /// Returns true if the settings never let this relay leave: no guard, or separate links. Separate links to the two
+    /// neighbours are those of [`Wiring::Pair`]. The guard is the collision avoidance.
     pub(crate) fn is_refused(&self, now: Instant) -> bool {
         let refusal = self.layers.departure_refusal(now, &self.member);
         let lasting = [Departure::NeedsGuard, Departure::NeedsChannel];
@@ -272,7 +276,7 @@ impl Node {
     }
 
     /// Makes this relay a spare outside of the chain. The call has no effect if the relay has taken part in the
-    /// protocol since its start, has requested to leave, or has two wires.
+    /// protocol since its start, has requested to leave, or has separate links to its neighbours ([`Wiring::Pair`]).
     pub(crate) fn wait_as_spare(&mut self, now: Instant) {
         let leaving = &self.layers.leaving;
         let may = self.searches() && self.is_untouched() && !leaving.requested;

@@ -260,8 +260,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake of node `from` at `side` that is not signed with this relay's key. After several in a row
-    /// the node is reported to the firmware.
+    /// Handles a handshake of node `from` at `side` that is not signed with this relay's key. After several such
+    /// handshakes in a row the node is reported to the firmware.
     pub(crate) fn on_forged(&mut self, now: Instant, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         let before = self.refusals(now);
@@ -313,7 +313,8 @@ impl Node {
         })
     }
 
-    /// Returns the side of `node` if this relay accepts messages of this ground station; otherwise `None`.
+    /// Returns the side of the ground station `node` if this relay accepts its messages. Otherwise, or if `node` is no
+    /// ground station, returns `None`.
     pub(super) fn ground_side(&self, node: u16) -> Option<Side> {
         let (own, all) = (self.member.node, self.member.all);
         let most = match self.member.settings.wiring {

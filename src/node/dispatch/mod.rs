@@ -56,7 +56,8 @@ mod timers;
 #[cfg(test)]
 mod tests;
 
-/// Claim to a node number that is sent back to its sender: side, destination node, and claim.
+/// Received claim that must be sent back: side and number of its sender, and the claim. A claim lets two nodes with one
+/// node number detect each other.
 pub(crate) type Echo = (Side, u16, Claim);
 
 #[derive(Clone, Debug)]
@@ -69,7 +70,7 @@ pub(crate) struct Node {
     pub(super) no_quorum_timer: NoQuorumTimer,
     /// Received claim that must be sent back to its sender as an echo; `None` if there is none.
     pub(super) echo: Option<Echo>,
-    /// Side to which this relay sends its next claim.
+    /// Side to which this relay sends its next claim to its node number.
     pub(super) claim_side: Side,
     /// Votes on views that the firmware has confirmed as stored.
     persisted: ViewRecord,
@@ -239,8 +240,8 @@ impl Node {
         self.layers.lease.until()
     }
 
-    /// Returns the start and end of this relay's time slots, as fractions of the frame. `None` without a valid
-    /// agreement, and if all slots have the same length.
+    /// Returns start and end of this relay's time slots, as fractions of the frame (all slots together). `None` without
+    /// a valid agreement, and if all slots have the same length.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         let void = self.layers.lease.has_lapsed() || self.layers.view.has_no_quorum();
         self.layers.round.slot_shares().filter(|_| !void)
@@ -358,10 +359,10 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` would leave out relays that are about to be linked.
+    /// Returns true if a view proposal from `side` would leave out relays that will soon be linked.
     ///
-    /// This is assumed if the proposal has visited fewer relays than the previous one, and its sender has only just
-    /// become the neighbour.
+    /// This is assumed if the proposal has visited fewer relays than the previous proposal, and its sender has only
+    /// just become the neighbour.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place

@@ -79,7 +79,8 @@ impl Node {
 
     /// Returns true if node `from` is outside of the chain and must not be selected.
     ///
-    /// If node `from` is the neighbour, its hello ends the link, because it has not selected this relay.
+    /// False if node `from` is the neighbour. Its hello then shows that it has not selected this relay, and ends the
+    /// link.
     pub(super) fn on_departure(&self, _: Instant, side: Side, from: u16, hello: &Hello) -> bool {
         hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
     }

@@ -99,9 +99,9 @@ impl Node {
 
     /// Handles a mission offer from node `from` at `side`. The node has loaded the same mission before flight.
     ///
-    /// An offer that repeats no recent number is answered by a hello, and the next offer can repeat the number of that
-    /// hello. An offer with a recent number is answered only if this relay has stored or refused the mission, or has a
-    /// newer one. Otherwise the hello would trigger the same offer again.
+    /// An offer without the number of a recent hello is answered by a hello. The next offer can contain the number of
+    /// that hello. Any other offer is answered only if this relay has stored or refused the mission, or has a newer
+    /// one. Otherwise the answer would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -221,7 +221,8 @@ impl Node {
     }
 
     /// Returns the pending mission offer to the neighbour at `side`; `None` if none is pending. An offer must answer a
-    /// recent hello of the neighbour. If there is none, returns a hello that requests one.
+    /// recent hello of the neighbour. Without such a hello, the result is a hello of this relay that requests a hello
+    /// of the neighbour.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

@@ -25,7 +25,8 @@ impl Node {
         }
     }
 
-    /// Records the drone's control state, from 1. See [`Reporting::handle_control`](crate::node::reports::Reporting).
+    /// Records the control state of the drone, as numbered in reports; the numbers begin with 1. See
+    /// [`Reporting::handle_control`](crate::node::reports::Reporting).
     #[cfg(feature = "telemetry")]
     pub(crate) fn report_control(&mut self, control: u16) {
         self.reporting.handle_control(&self.member, control);
@@ -88,10 +89,10 @@ impl Node {
         )
     }
 
-    /// Returns the refusals of the nearest refused relay toward Tx and toward Rx; 0 for none.
+    /// Returns the nearest nodes with a wrong mission or key, toward Tx and toward Rx; 0 for none.
     ///
-    /// The values are those of [`Entry::refusal`](crate::wire::message::Entry::refusal). Tx and Rx do not count: ground
-    /// stations have no place in the chain. Without the cargo feature `telemetry` both values are 0.
+    /// The values are those of [`Entry::refusal`](crate::wire::message::Entry::refusal). Tx and Rx do not count,
+    /// because ground stations are no relays. Without the cargo feature `telemetry` both values are 0.
     pub(super) fn refusals(&self, now: Instant) -> [u16; 2] {
         if !TELEMETRY {
             return [0; 2];
@@ -110,7 +111,8 @@ impl Node {
         })
     }
 
-    /// Sends a report ahead of its turn if this relay refuses a relay now. `before` are the refusals until now.
+    /// Schedules an early report if this relay now refuses a node, and refused none before. A node is refused for a
+    /// wrong mission or a wrong key. `before` has the earlier result of [`Self::refusals`].
     pub(super) fn report_refusal(&mut self, now: Instant, before: [u16; 2]) {
         if before == [0; 2] && self.refusals(now) != [0; 2] {
             self.reporting.handle_refusal(&self.member);
@@ -128,7 +130,7 @@ mod tests {
     use crate::settings::Wiring;
     use crate::wire::message::{Coarse, Detail, Entry, Reports};
 
-    /// Control states, as in an entry.
+    /// Control states of a drone, as numbered in a report.
     const STANDBY: u16 = 3;
     const ENGAGED: u16 = 4;
     const BLIND: u16 = 5;
@@ -153,7 +155,8 @@ mod tests {
         node
     }
 
-    /// Returns the next report toward Tx that is due at `now`, without the patience of an agreement.
+    /// Returns the next report toward Tx that is due at `now`. Reports are not delayed during an agreement on
+    /// positions.
     fn reported(node: &mut Node, now: Instant) -> Option<Reports> {
         let own = node.own(now);
         let wait = Duration::from_micros(0);
@@ -179,7 +182,7 @@ mod tests {
         report.entries.iter().map(Entry::relay).collect()
     }
 
-    /// Returns an entry of a relay with this control state, and this number of a refused node.
+    /// Returns an entry (state of a relay in a report) with this control state and [`Entry::refusal`].
     fn entry(relay: u16, control: u16, refusal: u16) -> Entry {
         Entry::new(
             relay + 1_000 * refusal,
@@ -327,7 +330,8 @@ mod tests {
         assert_eq!(stored, Some(8), "{report:?}");
     }
 
-    /// Checks that details that found no room in a report are taken from a later copy of the entry.
+    /// Checks that an entry sent without details is sent again with the details of a later copy. An entry is the state
+    /// of a relay in a report. The copy arrives by a different way.
     #[test]
     fn details_that_were_not_sent_are_taken_from_a_copy() {
         let mut node = watched(1, Wiring::Shared);
@@ -366,7 +370,7 @@ mod tests {
         assert_eq!(node.refusals(last + ms(120_000)), [0, 0]);
     }
 
-    /// Checks that only the first refusal is reported ahead of its turn.
+    /// Checks that only the first refusal of a node with a wrong mission is reported early.
     #[test]
     fn a_refusal_is_an_alarm_once() {
         let mut node = watched(3, Wiring::Shared);

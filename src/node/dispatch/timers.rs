@@ -125,9 +125,10 @@ impl Node {
             .is_solving(&self.layers.context(now, &self.member))
     }
 
-    /// Restarts the timers for silent neighbours and the first message, after the joint computation.
+    /// Restarts two timers after the joint computation of all positions. One timer is for silent neighbours, the second
+    /// for the first message along the chain.
     ///
-    /// All relays compute at the same time and send nothing meanwhile. These timers must not expire because of that.
+    /// All relays compute at the same time and send nothing meanwhile. The timers must not expire because of that.
     fn on_solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);

@@ -134,7 +134,7 @@ impl Link {
     }
 }
 
-/// Losses of the links to the four nearest nodes on one side, nearest node first.
+/// Losses of the links to the four nearest nodes on one side of the relay, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
     /// Node that will be selected once it has been received without gaps for long enough. `None` if there is none.
@@ -170,8 +170,8 @@ impl Damping {
     /// Records the loss of the link to the node `distance` relays away. If `counts` is false, because the channel loses
     /// many frames, only the loss of a flapping link counts.
     ///
-    /// If a different link on this side flaps, the lost link takes over the number of losses of that link. The reason
-    /// is that all links on one side cross the same gap in the chain.
+    /// If a different link on this side of the relay flaps, the lost link takes over the number of losses of that link.
+    /// The reason is that all links on one side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -227,8 +227,8 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the losses of all links on this side to those of the link lost last. These links were lost together,
-    /// because all of them cross the same gap in the chain.
+    /// Raises the losses of all links on this side of the relay to those of the link lost last. These links were lost
+    /// together, because all of them cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
@@ -248,8 +248,8 @@ impl Damping {
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if any link on this side has been lost repeatedly, at long intervals. The next loss of such a link
-    /// should be detected early.
+    /// Returns true if a link on this side of the relay has been lost repeatedly, at long intervals. The next loss of
+    /// such a link should be detected early.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -264,7 +264,7 @@ impl Damping {
         self.link(distance).is_some_and(|link| link.was_down)
     }
 
-    /// Returns a bit mask of the nodes whose links flap and must not be used. Bit 0 is the nearest node.
+    /// Returns a bit mask of the nodes whose links flap and must not be used. Bit 0 is the node nearest to this relay.
     pub(super) fn held_down_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
             .filter(|distance| self.is_held_down(*distance, now, settings))
@@ -277,7 +277,7 @@ impl Damping {
     }
 
     /// Records a frame of a candidate `distance` relays away. Returns true if this candidate has been received without
-    /// gaps for at least `probe_after` and at least `more`.
+    /// gaps for the longer of `probe_after` and `more`.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,

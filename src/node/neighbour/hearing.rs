@@ -39,7 +39,7 @@ impl ConsecutiveCounts {
     }
 }
 
-/// Set of recently received nodes on one side.
+/// Set of recently received nodes on one side of the relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hearing {
     since: Instant,
@@ -47,7 +47,7 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Nodes on one side whose mission or key was refused in the last one to two minutes.
+/// Nodes on one side of the relay with a wrong mission or key, from the last one to two minutes.
 ///
 /// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with a wrong key; the nearest node is first.
 #[derive(Clone, Copy, Debug)]
@@ -160,7 +160,7 @@ impl Hearing {
     }
 }
 
-/// Pending hellos to the four nearest nodes on one side, as bit masks; bit 0 is the nearest node.
+/// Pending hellos to the four nearest nodes on one side of the relay, as bit masks. Bit 0 is the nearest node.
 ///
 /// One mask has all pending hellos, the other mask those that request an answer.
 #[derive(Clone, Copy, Debug, Default)]
@@ -181,7 +181,7 @@ impl Hellos {
         }
     }
 
-    /// Schedules hellos that request an answer, to the four nearest nodes on this side.
+    /// Schedules hellos that request an answer, to the four nearest nodes on this side of the relay.
     pub(super) const fn schedule_all(&mut self) {
         self.due = 0x0F;
         self.reply = 0x0F;

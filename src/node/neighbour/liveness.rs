@@ -30,9 +30,8 @@ use crate::time::{Duration, Instant};
 /// After a silence as long as the maximum lease, it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// Ratio of unanswered requests at a loss to the longest recent run of unanswered requests.
-///
-/// With fewer requests a neighbour does not count as lost yet.
+/// Factor on the longest recent run of unanswered heartbeat requests, for the loss of a neighbour. A neighbour counts
+/// as lost only after at least three times as many unanswered requests.
 const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour.

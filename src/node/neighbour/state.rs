@@ -78,23 +78,23 @@ pub(crate) struct Neighbour {
     searches_since: Instant,
     /// Distance to the selected neighbour, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
-    /// Nodes on this side that have recently reported to receive this relay.
+    /// Nodes on this side of the relay that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
-    /// Selected neighbour, toward this relay, of each of the four nearest nodes on this side; 0 for none.
-    ///
-    /// The entry of the nearest node is the first.
+    /// Neighbours toward this relay that the four nearest nodes on one side of the relay have selected. 0 stands for no
+    /// neighbour. The entry of the nearest node is the first.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame on this side from a node that is not the neighbour. `None` if there was none.
+    /// Time of the last frame on this side of the relay from a node that is not the neighbour. `None` if there was
+    /// none.
     unselected_at: Option<Instant>,
-    /// Nodes on this side that this relay has recently received.
+    /// Nodes on this side of the relay that it has recently received.
     pub(super) hearing: Hearing,
     /// Number of consecutive hellos of each node that do not report reception of this relay.
     pub(super) not_received: ConsecutiveCounts,
     /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Bit 0 is the nearest node.
     reported_found: u8,
-    /// Nodes on this side whose mission or key this relay has recently refused.
+    /// Nodes on this side of the relay whose mission or key it has recently refused.
     refusals: Refusals,
-    /// Number of consecutive handshakes with a wrong key, for each node on this side.
+    /// Number of consecutive handshakes with a wrong key, for each node on this side of the relay.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
@@ -140,7 +140,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts this side at `now`. `node` is the neighbour configured in the mission; 0 for none.
+    /// Starts this side of the relay at `now`. `node` is the neighbour configured in the mission; 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -180,7 +180,7 @@ impl Neighbour {
         self.node
     }
 
-    /// Returns true if this side has no neighbour and no longer searches for one.
+    /// Returns true if this side of the relay has no neighbour and no longer searches for one.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
@@ -365,7 +365,7 @@ impl Neighbour {
         self.unselected_at = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour; otherwise `None`.
+    /// Returns the start of the search while this side of the relay has no neighbour; otherwise `None`.
     pub(super) const fn searching_since(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -384,7 +384,7 @@ impl Neighbour {
         }
     }
 
-    /// Schedules hellos that request an answer, to the four nearest nodes on this side.
+    /// Schedules hellos that request an answer, to the four nearest nodes on this side of the relay.
     pub(crate) const fn schedule_hellos(&mut self) {
         self.hellos.schedule_all();
     }
@@ -416,8 +416,8 @@ impl Neighbour {
         }
     }
 
-    /// Selects `candidate` if this side has no neighbour, or if the candidate is better. Returns true if the candidate
-    /// was selected. It is better if it is nearer, or if more relays can be reached through it.
+    /// Selects `candidate` if this side of the relay has no neighbour, or if the candidate is better. A candidate is
+    /// better if it is nearer, or if more relays can be reached through it. Returns true if the candidate was selected.
     ///
     /// The candidate has sent a hello, receives this relay, and has selected this relay, no node, or a node farther
     /// away.
@@ -502,7 +502,8 @@ pub(crate) struct Candidate {
     pub(crate) ready: bool,
     /// True if more relays can be reached through the candidate than through the selected neighbour.
     pub(crate) longer: bool,
-    /// True if the selected neighbour is ordered to leave and the candidate is the node beyond it.
+    /// True if the candidate replaces the selected neighbour, which is ordered to leave the chain. The candidate is the
+    /// node on that neighbour's far side.
     pub(crate) passes: bool,
 }
 
@@ -534,35 +535,37 @@ impl Neighbour {
         self.node == self.agreed.node()
     }
 
-    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. This relay makes
-    /// proposals only without a neighbour toward the leader.
+    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. A relay makes proposals
+    /// only if it has no neighbour toward the leader.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// Records that a view proposal was granted. The sender of the proposal becomes this side's neighbour in the view.
+    /// Records that a view proposal was granted. Its sender becomes the neighbour in the view, on this side of the
+    /// relay.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
 
-    /// Leaves the view: this side has no neighbour in an agreed view any more.
+    /// Leaves the view: this side of the relay has no neighbour in an agreed view any more.
     pub(crate) const fn leave(&mut self) {
         self.agreed.agree(0);
     }
 
-    /// Records that a view proposal was refused. This side requests no new view until its neighbour changes.
+    /// Records that a view proposal was refused. This side of the relay requests no new view until its neighbour
+    /// changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
     /// Records that a view proposal was granted, on the side toward the last relay. If `ends` is true, this relay is
-    /// the last one of the view and has no neighbour there.
+    /// the last one of the view, so that it has no neighbour on this side.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Neighbour on one side according to the last decisions on views, as node numbers; 0 for none.
+/// Neighbour on one side of the relay at the last decisions on views, as node numbers; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view.
@@ -597,12 +600,12 @@ impl AgreedNodes {
         };
     }
 
-    /// Records that a view proposal was granted. The sender of the proposal is this side's neighbour in the view.
+    /// Records that a view proposal was granted. Its sender is the neighbour in the view, on this side of the relay.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
 
-    /// Records that a view proposal was granted with `node` as the neighbour on this side.
+    /// Records that a view proposal was granted with `node` as the neighbour on this side of the relay.
     pub(super) const fn agree(&mut self, node: u16) {
         self.in_view = node;
         self.counted = node;
@@ -648,12 +651,12 @@ impl Neighbour {
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
-    /// Returns true if this side's neighbour is linked, not lost, and nearer than `distance` relays.
+    /// Returns true if the neighbour on this side is linked, not lost, and nearer than `distance` relays.
     pub(crate) fn links_within(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
-    /// Returns true if this side's neighbour is linked, not lost, and farther than `distance` relays away.
+    /// Returns true if the neighbour on this side is linked, not lost, and over `distance` relays away.
     pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }

@@ -24,7 +24,7 @@ use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 use core::task::Poll;
 
-/// Kind and data of the current pass along the chain.
+/// Kind and data of the current pass: a message along the chain, and its result on the way back.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(SweepPass),
@@ -33,7 +33,8 @@ pub(super) enum PassKind {
     Turn(TurnPass),
 }
 
-/// Lateral offset, altitude and maximum x that the joint method has computed for this relay.
+/// Lateral offset, altitude and maximum x that the joint method has computed for this relay. The joint method optimises
+/// x, y and altitude of all relays together.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
     /// Lateral offset and altitude that this relay has computed for itself.
@@ -41,21 +42,22 @@ pub(super) struct JointPlace {
     /// Largest allowed x of this relay, m. Beyond it the relays nearer to Rx could not keep the minimum separation.
     /// Unused in an interference field.
     pub(super) end_m: f32,
-    /// True if every relay takes the farthest x that meets the target SIR.
+    /// True if every relay takes the x farthest from the leader that meets the target SIR.
     ///
-    /// False if a relay may take a nearer x, which helps the next hop.
+    /// False if a relay may take an x nearer to the leader, which helps the next hop.
     pub(super) plain: bool,
 }
 
 /// Time slots of this relay, each as long as its hop needs. Unused if all slots have the same length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
-    /// The x of this relay in the joint solution, m, and its slots at this x, as fractions of the frame.
+    /// The x of this relay in the joint solution, m, and its slots at this x. Slots are fractions of the frame (all
+    /// slots together).
     ///
     /// `None` without a solution.
     pub(super) solved: Option<(f32, SlotShares)>,
-    /// Start and end of this relay's slots at the agreed positions, as fractions of the frame. `None` without an
-    /// agreement.
+    /// Start and end of this relay's slots at the agreed positions. They are fractions of the frame (all slots
+    /// together). `None` without an agreement.
     pub(super) agreed: Option<SlotShares>,
 }
 
@@ -82,11 +84,11 @@ pub(crate) struct Computation {
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
-    /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. In Algorithm 2 they
-    /// describe the receiver of the hop from this relay.
+    /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. In Algorithm 2 (relays move
+    /// in turn) that relay is the receiver of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Fitted time slots of this relay. Empty without the feature `altitude`.
+    /// Time slots of this relay that are as long as each hop needs. Empty without the feature `altitude`.
     pub(super) fitted: [FittedSlots; ALTITUDE as usize],
     /// Average of the interference measured at the agreed position. Used only if the interference is known as a
     /// function of x (a field).
@@ -94,8 +96,8 @@ pub(crate) struct Computation {
     /// Measurements of the unknown interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// Upper bound of the worst hop's SIR at the configured altitudes, linear, for any x. `None` until it is known, and
-    /// always at a relay other than the leader.
+    /// Upper bound of the worst hop's SIR at the configured altitudes, linear. The bound holds for all x of the relays.
+    /// `None` until it is known, and always at a relay other than the leader.
     pub(super) bound: Option<f32>,
 }
 
@@ -186,8 +188,8 @@ impl Computation {
         self.meter.restart();
     }
 
-    /// Returns this relay's slots at the agreed positions, as fractions of the frame. `None` unless each slot is as
-    /// long as its hop needs.
+    /// Returns this relay's slots at the agreed positions, as fractions of the frame (all slots together). `None`
+    /// unless each slot is as long as its hop needs.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         self.fitted.first()?.agreed
     }
@@ -333,8 +335,8 @@ impl Computation {
         }
     }
 
-    /// Returns this relay's lateral offset, altitude and power for trying target SIRs. If `chosen` is true, offset and
-    /// altitude are those of the joint method; otherwise they are those configured.
+    /// Returns the lateral offset, altitude and power with which this relay tries target SIRs. If `chosen` is true,
+    /// offset and altitude are those of the joint method; otherwise they are those configured.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -346,8 +348,8 @@ impl Computation {
         }
     }
 
-    /// Returns the number of completed rounds of Algorithm 2, and the SIR of the chain after the last one. `None`
-    /// except at the leader.
+    /// Returns the number of completed rounds of Algorithm 2, and the chain's SIR after the last round. In Algorithm 2
+    /// the relays move in turn. `None` unless this relay is the leader and runs Algorithm 2.
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         match &self.task {
             LeaderTask::Adjusting(rounds) => Some((rounds.done(), rounds.sir)),
@@ -356,7 +358,7 @@ impl Computation {
     }
 }
 
-/// Solver of the joint method for all positions at once, for up to [`MOST_SOLVED`] relays.
+/// Solver of the joint method (x, y and altitude of all relays together). It works for up to [`MOST_SOLVED`] relays.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// Current task of the leader: prediction, joint method, search for the target SIR, or Algorithm 2.
@@ -381,21 +383,23 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if no other algorithm follows this search.
         last: bool,
-        /// True for a search at the configured altitudes, because no target is feasible at the joint ones.
+        /// True for a search at the configured altitudes, because those of the joint method failed. No target was
+        /// feasible at the joint method's altitudes.
         given: bool,
     },
     /// Algorithm 2, in which the relays move one after the other.
     Adjusting(Rounds),
 }
 
-/// Progress of Algorithm 2: number of rounds, and SIR of the chain.
+/// Progress of Algorithm 2 (relays move in turn): number of rounds, and SIR of the chain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
-    /// Number of completed rounds. The first pass of the token, in which no relay moves, does not count.
+    /// Number of completed rounds of Algorithm 2 (relays move in turn). The first pass of its token along the chain, in
+    /// which no relay moves, does not count.
     done: u16,
     turn: AdjustStep,
-    /// SIR of the chain's worst hop after the last round, linear.
+    /// SIR of the chain's worst hop after the last round of Algorithm 2 (relays move in turn), linear.
     pub(crate) sir: f32,
 }
 
@@ -417,8 +421,8 @@ impl Rounds {
         self.done
     }
 
-    /// Records the result of a pass of the token. Returns true if it was the last pass. `any` is true if any relay has
-    /// moved in this pass. `sir` is the SIR of the chain's worst hop, linear.
+    /// Records the result of a pass of Algorithm 2's token along the chain. Returns true if it was the last pass. `any`
+    /// is true if any relay has moved in this pass. `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -475,7 +479,7 @@ impl LeaderTask {
 #[derive(Clone, Debug)]
 pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
-    /// Checksum of the previous relay's data, by which duplicates are recognised; see [`fingerprint`].
+    /// Checksum of the previous relay's data; equal checksums show a duplicate. See [`fingerprint`].
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes of the joint method.
     pub(crate) chosen: bool,
@@ -657,17 +661,17 @@ pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     })
 }
 
-/// State of one relay while the token of Algorithm 2 travels along the chain.
+/// State of one relay while the token of Algorithm 2 (relays move in turn) travels along the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Action of every relay in this pass of the token: look, move or stop.
+    /// Action of every relay in this pass of Algorithm 2's token: look, move or stop.
     pub(crate) turn: AdjustStep,
-    /// SIR of the chain's worst hop before this pass of the token, linear.
+    /// SIR of the chain's worst hop before this pass of Algorithm 2's token, linear.
     pub(crate) sir: f32,
     /// Position and power of the previous relay, which sends to this relay; `None` if Tx is the sender.
     pub(super) before: Option<HopEnd>,
     search: Option<LocalSearch>,
-    /// True if this relay, or a relay that had the token after it, has moved in this pass.
+    /// True if this relay, or a relay farther from the leader, has moved in this pass of the token.
     pub(crate) any: bool,
     /// Worst SIR of the hops between this relay and Rx, linear.
     pub(crate) worst: f32,

@@ -230,7 +230,8 @@ impl Computation {
     }
 
     /// Starts the search for the highest target SIR at the joint method's lateral offsets and altitudes. The first
-    /// targets are near `target` (linear). If `target` is 0, they are the usual ones.
+    /// targets are near `target` (linear) if `target` is above 0 and `Settings::predict` is true. Otherwise they are
+    /// those of a search without a prediction.
     pub(super) fn search_chosen(
         &mut self,
         context: &Context<'_>,

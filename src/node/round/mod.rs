@@ -351,9 +351,10 @@ impl Round {
     }
 }
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs.
+/// Maximum number of hops per call of [`Computation::work`] in the prediction of the target SIR. Each hop is computed
+/// for 16 target SIRs.
 ///
-/// If the interference varies along x, one call predicts only a part of one hop.
+/// If the interference varies along x, one call computes only a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
 /// Maximum number of hops per call of [`Computation::work`] in a uniform interference field.

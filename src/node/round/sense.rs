@@ -42,7 +42,8 @@ impl Computation {
         SENSING && context.settings().listen.is_some() && context.mission().field().is_none()
     }
 
-    /// Returns true if the leader must distribute its interference estimate before any other pass.
+    /// Returns true if the leader must distribute its interference estimate to all relays. Until then the
+    /// leader starts no different pass (message along the chain).
     pub(super) fn must_distribute(&self, context: &Context<'_>) -> bool {
         Self::is_sensing_enabled(context)
             && context.leads()
@@ -268,10 +269,10 @@ impl Computation {
 
     /// Compares this relay's sensor with the measurements of all other relays.
     ///
-    /// A relay whose measurement is absurd excludes itself. A relay counts as deaf if it measures no interference where
-    /// the other relays' measurements predict some. A relay that excluded itself earlier checks whether its
-    /// measurements now agree with the others. Finally the relay adds its sums to the result, unless it has just
-    /// excluded itself.
+    /// A relay whose measurement is absurd excludes itself. A relay counts as deaf (faulty receiver) if it measures no
+    /// interference where the other relays' measurements predict some. A relay that excluded itself earlier checks
+    /// whether its measurements now agree with the others. Finally the relay adds the sums over its measurements to the
+    /// sums that travel along the chain, unless it has just excluded itself.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,

@@ -94,9 +94,9 @@ impl Arrival {
 /// the leader has restarted.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of the pass numbers of first passes along the chain. The first pass of a view, or after a leader's start,
-/// has a multiple of 64. No other pass has such a number. A relay can join a first pass without knowledge of earlier
-/// passes.
+/// Common divisor of the numbers of first passes (messages along the chain). A first pass is the leader's first one in
+/// a view or after its start. Only first passes have multiples of 64 as numbers. So a relay can join a first pass
+/// without knowledge of earlier passes.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.

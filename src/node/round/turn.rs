@@ -12,11 +12,11 @@ use crate::place::Placement;
 use crate::wire::message::{AdjustStep, Moved, Token};
 use core::task::Poll;
 
-/// Number of positions that one call of [`Computation::continue_turn`] evaluates in Algorithm 2. The first value is for
-/// traffic from Tx to Rx only, the second for traffic also back to Tx.
+/// Number of positions that one call of [`Computation::continue_turn`] evaluates in Algorithm 2. In Algorithm 2 the
+/// relays move in turn. The first value is for data from Tx to Rx only, the second for data in both directions.
 ///
-/// A call also completes the current altitude of the search grid: at most 24 more positions, or 194 for traffic also
-/// back to Tx.
+/// A call also completes the current altitude of the search grid: at most 24 more positions, or 194 for data in both
+/// directions.
 const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 fn neighbour(context: &Context<'_>, place: Placement, power_w: f32) -> HopEnd {
@@ -28,7 +28,7 @@ fn neighbour(context: &Context<'_>, place: Placement, power_w: f32) -> HopEnd {
 }
 
 impl Computation {
-    /// Handles the token of Algorithm 2, received from the previous relay.
+    /// Handles the token of Algorithm 2 (relays move in turn), received from the previous relay.
     pub(crate) fn on_token(&mut self, context: &Context<'_>, token: &Token) -> Action {
         let same = matches!(&self.pass, PassKind::Turn(turn_pass) if turn_pass.turn == token.turn);
         let arrival = self.state.arrival(token.number, same);
@@ -48,7 +48,8 @@ impl Computation {
         self.take_turn(context, TurnPass::new(token.turn, token.sir, Some(before)))
     }
 
-    /// Starts this relay's search for a better position, when it has the token of Algorithm 2.
+    /// Starts this relay's search for a better position, because it has the token of Algorithm 2. In Algorithm 2 the
+    /// relays move in turn: the relay with the token moves.
     pub(super) fn take_turn(&mut self, context: &Context<'_>, mut turn_pass: TurnPass) -> Action {
         self.state.wait();
         let mut searching = false;
@@ -98,7 +99,7 @@ impl Computation {
         self.conclude_turn(context, f32::MAX)
     }
 
-    /// Handles the reply to the token of Algorithm 2, received from the next relay.
+    /// Handles the next relay's reply to the token of Algorithm 2 (relays move in turn).
     pub(crate) fn on_moved(&mut self, context: &Context<'_>, moved: &Moved) -> Action {
         if let PassKind::Turn(turn_pass) = &mut self.pass
             && !turn_pass.is_searching()
@@ -112,8 +113,9 @@ impl Computation {
         Action::Stale
     }
 
-    /// Ends this relay's part in a pass of Algorithm 2, and prepares its reply. The reply contains the worst SIR of all
-    /// hops from this relay to Rx. `worst` is the worst SIR of the hops from the next relay to Rx, linear.
+    /// Ends this relay's part in a pass of Algorithm 2, and prepares its reply to the token. The reply contains the
+    /// worst SIR of all hops from this relay to Rx. `worst` is the worst SIR of the hops from the next relay to Rx,
+    /// linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,

@@ -550,8 +550,8 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive refusals of view proposals, for lack of a quorum.
     refusals: u8,
-    /// Earliest time of a view request for a new reason after a refusal. `None` if a new reason must not make the
-    /// request earlier.
+    /// Earliest time of the view request after a refusal, if a new reason for a view arises. A new reason is, for
+    /// example, a changed neighbour. `None` if a new reason has no effect on the time of the request.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
@@ -575,8 +575,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, and repeats the request until a view is decided. If a view was refused before, the new reason
-    /// shortens the wait.
+    /// Requests a view, and repeats the request until a view is decided. Each call stands for a new reason, such as a
+    /// changed neighbour. After a refused view the call shortens the wait until the next request.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);

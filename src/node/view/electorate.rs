@@ -55,7 +55,7 @@ pub(crate) struct Electorate {
     /// True if this relay is a member of the view `agreed`, so that its vote counts.
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// View that this relay has accepted, but not yet known to be agreed on; `None` if there is none.
+    /// View that this relay has accepted, and that is not yet known to be agreed on. `None` if there is none.
     pub(super) accepted: Option<Successor>,
     /// Proposals that this relay has voted on and that can still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
@@ -142,8 +142,8 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of node `node` alone is not enough for a quorum on `proposal`. This relay does not vote
-    /// by the call.
+    /// Returns true if the vote of node `node` alone is not enough for a quorum on `proposal`. The call itself records
+    /// no vote.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,

@@ -215,7 +215,8 @@ pub(super) struct DecidedView {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Chain {
     pub(super) relays: Vec<RelayState>,
-    /// Part number of each relay while links are cut. Relays with equal numbers receive each other.
+    /// Number of the part of the chain to which each relay belongs while links are cut. Relays of the same part receive
+    /// each other.
     pub(super) parts: Vec<u8>,
     /// Frames in transit, which can still arrive; sorted and without duplicates.
     pub(super) air: Vec<Frame>,
@@ -244,7 +245,7 @@ pub(super) enum ModelEvent {
     Passes(usize),
     Reboots(usize),
     Forgets(usize),
-    /// Relay with this list index: it leaves the chain, or joins it again.
+    /// The relay with this list index leaves the chain, or joins it again.
     Moves(usize),
 }
 
@@ -370,7 +371,8 @@ pub(super) struct Check {
     pub(super) heals: bool,
 }
 
-/// Returns all ways to divide `relays` relays into parts. Each way is a list with the part number of each relay.
+/// Returns all ways to divide `relays` relays into parts that do not receive each other. Each way is a list with the
+/// number of the part to which each relay belongs.
 pub(super) fn partitions(relays: usize) -> Vec<Vec<u8>> {
     let mut all = vec![vec![]];
     for _ in 0..relays {

@@ -14,8 +14,8 @@ const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 /// limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust (limit of the relays' moves) at which the final target of an improvement is predicted. With a smaller
-/// trust the predicted target would be too low.
+/// Minimum trust (limit of the relays' moves) at which the result of an improvement is predicted. The result is the
+/// chain's target. With a smaller trust the predicted target would be too low.
 const RESTRAINED: f32 = 0.05;
 
 /// Trust (limit of the relays' moves) below which the improvement of a chain is given up.
@@ -25,17 +25,18 @@ const LEAST_TRUST: f32 = 1e-4;
 /// Rx. The usual length is 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the upper limit on the target SIR, in ln(SIR). The limit is raised if the chain meets it, but does
-/// not reach the upper bound of all chains.
+/// First increase of the upper limit on the target SIR, in ln(SIR). The limit is raised if the chain meets the limit,
+/// but its SIR does not reach the upper bound on the SIR of any chain.
 const EXCESS: f32 = 0.03;
 
-/// First upper limit on the chain's slack, divided by the distance from Tx to Rx. Without the limit a large slack could
-/// outweigh the penalty for relays too near the interferer.
+/// First upper limit on the slack, the length by which a chain reaches beyond Rx. The unit is the distance from Tx to
+/// Rx. Without the limit a large slack could outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Lowest value to which the upper limit on the chain's slack can fall. The unit is the distance from Tx to Rx.
+/// Lowest upper limit on the slack, the length by which a chain reaches beyond Rx. The unit is the distance from Tx to
+/// Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Factor on a negative slack of a chain, when two chains are compared.
+/// Factor on a negative slack (length by which a chain ends before Rx), when two chains are compared.
 const SHORT: f32 = 2.0;
 
 /// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
@@ -45,15 +46,16 @@ const CLOSE: f32 = 3e-6;
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of ln(target SIR) below which the final target of an improvement can be predicted.
+/// Expected increase of ln(target SIR) below which the result of an improvement can be predicted. The result is the
+/// chain's target SIR.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which a chain that falls far short of Rx counts as diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Largest distance to Rx by which a chain is too short and is still improved again. The unit is the distance from Tx
-/// to Rx.
+/// Maximum distance from the chain's end to Rx at which a chain that is too short is improved again. The unit is the
+/// distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -66,7 +68,8 @@ pub(crate) enum AscentStep {
     Raise,
     /// Compute new moves of the relays by a backward pass, from the last relay to the first.
     Again,
-    /// End the improvement of this chain, or repeat the improvement with a lower limit on the slack.
+    /// End the improvement of this chain, or repeat it with a lower upper limit on the slack. The slack is the length
+    /// by which the chain reaches beyond Rx.
     Over,
 }
 
@@ -78,8 +81,8 @@ pub(crate) struct Ascent {
     /// chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target, in ln(SIR), at which the chain is compared with the upper bound of all chains. This target is raised if
-    /// the chain does not reach the bound.
+    /// Target, in ln(SIR), at which the chain is compared with the upper bound on any chain's SIR. This target is
+    /// raised if the chain does not reach the bound.
     pub(crate) limit: f32,
     /// Next increase of `limit`, in ln(SIR).
     excess: f32,
@@ -109,8 +112,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. Targets are in ln(SIR),
-    /// never below `floor`.
+    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. The slack is the length by
+    /// which the chain reaches beyond Rx. Targets are in ln(SIR), never below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -133,7 +136,7 @@ impl Ascent {
 
     /// Returns this state with `limit` as the upper limit on the target, in ln(SIR).
     ///
-    /// At this target the chain is compared with the upper bound of all chains.
+    /// At this target the chain is compared with the upper bound on the SIR of any chain.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -142,19 +145,20 @@ impl Ascent {
         }
     }
 
-    /// Returns the upper limit on the chain's slack, m. Slack above this limit does not count when chains are
-    /// compared.
+    /// Returns the upper limit on the slack, the length by which the chain reaches beyond Rx, m. Slack above this limit
+    /// does not count when chains are compared.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the upper limit on the chain's slack.
+    /// Returns true if [`tighten`](Self::tighten) would lower the upper limit on the chain's slack. The slack is the
+    /// length by which the chain reaches beyond Rx.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the upper limit on the chain's slack if relays are too near the interferer. Returns true if the limit
-    /// was lowered.
+    /// Lowers the upper limit on the chain's slack if relays are too near the interferer. The slack is the length by
+    /// which the chain reaches beyond Rx. Returns true if the limit was lowered.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -172,14 +176,14 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the target SIR has reached its limit. The chain must then be compared with the upper bound of
-    /// all chains.
+    /// Returns true if the target SIR has reached its limit. The chain must then be compared with the upper bound on
+    /// the SIR of any chain.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the upper limit on the target SIR; returns the next action. Called if the chain meets the limit, but does
-    /// not reach the upper bound of all chains.
+    /// Raises the upper limit on the target SIR; returns the next action. Called if the chain meets the limit, but its
+    /// SIR does not reach the upper bound on the SIR of any chain.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -192,7 +196,8 @@ impl Ascent {
     }
 
     /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. The sums are the
-    /// slack that the relays' moves are expected to add, and the change of slack per unit of ln(target SIR).
+    /// length that the relays' moves are expected to add beyond Rx (slack), and the change of slack per unit of
+    /// ln(target SIR).
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -220,8 +225,8 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) is expected to change by less than `by`. The change follows from the slack and
-    /// the relays' moves.
+    /// Returns true if the slack and the expected gain of the moves are small. Each of them must change ln(target SIR)
+    /// by less than `by`.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -276,8 +281,8 @@ impl Ascent {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current chain. `slack` is the trial chain's slack, m, at the
-    /// target `sigma`, as ln(SIR).
+    /// Returns true if a trial chain is better than the current chain. `slack` is the length by which the trial chain
+    /// reaches beyond Rx, m, at the target `sigma`, as ln(SIR).
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -301,7 +306,8 @@ impl Ascent {
     }
 
     /// Accepts the trial chain, and returns the next action. `share` is the fraction of their computed moves that the
-    /// relays made in the trial. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
+    /// relays made in the trial. `slack` is the length by which the chain reaches beyond Rx, m, at the target `sigma`,
+    /// in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -321,7 +327,7 @@ impl Ascent {
     }
 
     /// Returns the next action after the target of the unchanged chain was raised to `sigma`, in ln(SIR). `slack` is
-    /// the chain's slack at this target, m.
+    /// the length by which the chain reaches beyond Rx at this target, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

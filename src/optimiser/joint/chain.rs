@@ -214,7 +214,7 @@ impl Gains {
     }
 
     /// Returns the gains of hop `k` for data toward Rx and toward Tx. `k` is 1 (hop from Tx) to N + 1 (hop to Rx), and
-    /// `relays` is N. `sent_by` returns a gain for the power of the relay with the given index.
+    /// `relays` is N. `sent_by` converts a gain to that for the transmit power of the relay with the given index.
     pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
         let there = match k {
             1 => self.from_tx,
@@ -254,15 +254,17 @@ pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
 /// Stored state of the solver for one segment, which is ten consecutive relays. It has the x of the last relay before
-/// the segment, and derivatives of the chain's slack. The derivatives are by the position of the segment's last relay.
+/// the segment, and derivatives of the chain's slack (length by which it reaches beyond Rx). The derivatives are by the
+/// position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the last relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
+    /// First derivatives of the chain's slack (length by which it reaches beyond Rx), m/m. They are by the x, y and h
+    /// of the segment's last relay.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's slack by the coordinates of the segment's last relay, 1/m. The order is xx,
-    /// xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack (length by which it reaches beyond Rx), 1/m. They are by the coordinates
+    /// of the segment's last relay. The order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 

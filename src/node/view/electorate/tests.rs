@@ -49,8 +49,8 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the view decided on `proposal` after it has visited `nodes` in this order. `None` without a quorum. Of
-    /// these nodes, only the last `accept` receive the decision.
+    /// Returns the view decided on `proposal` after it has visited `nodes` in this order. `None` without a quorum.
+    /// `accept` is the number of nodes, from the end of `nodes`, that receive the decision.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
