@@ -76,8 +76,8 @@ const MOST_SWEEPS: u32 = 48;
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound of the chain's SIR, linear. This is the maximum SIR of the hop between the leader and the nearer
-    /// end, Tx or Rx.
+    /// Upper bound of the chain's SIR, linear. This is the maximum SIR of the hop between the leader and the end of the
+    /// chain (Tx or Rx) next to it.
     ceiling: f32,
     /// First target of the fixed-step schedule (gamma_0 of the paper), or upper bound of the bracketed one.
     start: f32,
@@ -161,8 +161,8 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next list of targets by `ladder`, which the leader expects to end the search. If `ladder` is for a
-    /// plain pass, all later passes are plain, too.
+    /// Replaces the next list of targets by `ladder`. The leader expects that the pass with these targets ends the
+    /// search. If `ladder` is for a plain pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);

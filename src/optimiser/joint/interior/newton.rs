@@ -26,7 +26,7 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest positive pivot, divided by the value of that diagonal element before the elimination.
+/// Smallest pivot that counts as positive, divided by the diagonal element before the elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
 /// Curvature of a coordinate whose two limits are equal. The curvature is so large that the Newton step does not move
@@ -67,7 +67,7 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Lagrange multipliers of a hop's levels, the slacks of the levels, and the barrier weight `mu`.
+/// Lagrange multipliers of a hop's two levels, their slacks (level minus target), and barrier weight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -88,7 +88,8 @@ impl Weights {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the hop's Lagrange multipliers after a Newton step that changes the two slacks by a and b.
+    /// Returns the hop's Lagrange multipliers after a Newton step. The step changes the hop's two slacks (level minus
+    /// target) by a and b.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
