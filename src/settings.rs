@@ -239,8 +239,8 @@ impl Settings {
         Self::DEFAULT.with_hop_time(alone, baud)
     }
 
-    /// Returns settings for relays that share one half-duplex radio channel of `baud` bit/s. `load` is the number of
-    /// relays in range of each other, with the overhead of a frame.
+    /// Returns settings for relays that share one half-duplex radio channel of `baud` bit/s. `load` has the number of
+    /// relays in range of each other, and the overhead of a frame.
     ///
     /// `probe_after` is 5 s, or longer if the channel would be overloaded with 5 s ([`ChannelLoad::carried`]).
     /// `dead_after` is three times `probe_after`. `hop_time` is the value of [`ChannelLoad::hop_time`] with a latency

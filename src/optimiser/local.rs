@@ -309,8 +309,8 @@ impl LocalSearch {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the best x at the next altitude of the coarse-to-fine search. Returns the number of evaluations, or
-    /// `None` after the last round.
+    /// Searches the best x at the next altitude of the coarse-to-fine search. Returns the number of evaluations of both
+    /// hops, or `None` after the last round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;

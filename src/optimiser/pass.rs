@@ -321,9 +321,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for data in both directions. `hop` leads from Rx to this
-    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay's x is less than `reach` if its
-    /// SIR from Rx would be too low at `reach`.
+    /// Returns the chain's slack and this last relay's x, m, for data in both directions. The slack is the maximum
+    /// length of the chain minus D. `hop` leads from Rx to this relay, and `slack` returns the slack toward Rx for an x
+    /// of this relay. The relay's x is less than `reach` if its SIR from Rx would be too low at `reach`.
     fn held(
         &self,
         hop: &FromRx,
@@ -435,14 +435,15 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
+/// Result of a sweep (a pass of target SIRs): the chain's slacks, and the target to commit, if any. A slack is the
+/// maximum length of a chain that meets a target, minus the distance from Tx to Rx.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
     /// Index of the committed target in the pass's list of targets. The relays take their positions for this target.
     /// `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
-    /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
-    /// target.
+    /// Slack of the chain for each target that every hop can meet, m. The slack is the maximum length of the chain
+    /// minus the distance from Tx to Rx. It is 0 or more if the chain meets the target.
     pub slacks: PerTarget,
 }
 

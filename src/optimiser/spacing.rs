@@ -299,8 +299,8 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x, m, at which the hop meets `target` in both directions of data. It is at most
-    /// `near`. `None` if there is none. The receiver is at x = `place`.
+    /// Returns the sender's largest x, m, at which the hop meets `target` in both directions of data. The result is at
+    /// most `near`. `None` if there is none. The receiver is at x = `place`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;

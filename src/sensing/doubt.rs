@@ -264,7 +264,7 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay still does not fit those of the others.
+/// Returns true if an excluded relay's measurement still does not fit those of the remaining relays.
 ///
 /// The measurement v = 1e-12 W / I at `place` is compared with e. e is the value at this place of a source fitted to
 /// `others`, the sums of the remaining relays. The difference is (v / e - e / v) / 2, which is symmetric in both.

@@ -89,13 +89,13 @@ const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 pub struct SlotShares {
     /// Begin and end of the slot in which this relay sends to the next node toward Rx.
     pub to_rx: [f32; 2],
-    /// Begin and end of the slot in which this relay sends to the next node toward Tx. In a mission of one direction
-    /// both are 1: the slot is empty.
+    /// Begin and end of the slot in which this relay sends to the next node toward Tx. In a mission with data toward Rx
+    /// only, begin and end are 1: the slot is empty.
     pub to_tx: [f32; 2],
     /// Begin and end of the slot in which this relay receives from the next node toward Tx.
     pub from_tx: [f32; 2],
-    /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission of one
-    /// direction both are 1: the slot is empty.
+    /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission with data
+    /// toward Rx only, begin and end are 1: the slot is empty.
     pub from_rx: [f32; 2],
     /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate from Rx to Tx is r times
     /// this value, with the mission's required ratio r (`reverse`).

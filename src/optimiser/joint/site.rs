@@ -518,8 +518,8 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if it is far enough away. The chain's
-    /// slack is reduced by the penalty.
+    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if it is far enough away. The penalty is
+    /// subtracted from the chain's slack, the length by which the chain overshoots Rx.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)

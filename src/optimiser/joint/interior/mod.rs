@@ -608,8 +608,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(front)
     }
 
-    /// Eliminates all relays of `segment`, then begins the next segment or the computation of steps. `None` if the
-    /// Newton system cannot be solved.
+    /// Eliminates all relays of `segment`, which has ten relays, from the Newton system. Then begins the next segment
+    /// or the computation of steps. `None` if the Newton system cannot be solved.
     fn forward(&mut self, chain: &Chain<'_, impl SeatOf>, segment: u16) -> Option<()> {
         let relays = chain.relays();
         if segment == 0 {
@@ -631,8 +631,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Computes the Newton steps of one part of `segment`, from its last relay to its first. `None` if the system
-    /// cannot be solved or a step is not finite.
+    /// Computes the Newton steps of the first six or the last four relays of `segment`. It starts with the relay
+    /// nearest to Rx. `None` if the system cannot be solved or a step is not finite.
     fn substitute(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,

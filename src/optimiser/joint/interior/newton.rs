@@ -59,7 +59,7 @@ pub(super) struct Factor {
     rows: [Row; 3],
 }
 
-/// Sums over all hops and relays, for the Newton step of the target.
+/// Sums over all hops and relays, for the Newton step of the target T, in ln(SIR).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,
@@ -76,14 +76,14 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier divided by the slack, for each direction of data on the hop.
+    /// Returns the Lagrange multiplier divided by the slack (level minus target) for each data direction.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the Lagrange multipliers at the optimum: mu / slack for each direction of data on the hop. mu is the
-    /// barrier weight.
+    /// Returns the Lagrange multipliers at the optimum: mu / slack for each direction of data on the hop. The slack is
+    /// the level minus the target, and mu is the barrier weight.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
@@ -286,7 +286,8 @@ impl Sums {
         column: 0.0,
     };
 
-    /// Returns the Newton step of the target. `None` if the system has no maximum, so that there is no step.
+    /// Returns the Newton step of the target T, in ln(SIR). `None` if the system has no maximum, so that there is no
+    /// step.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;
         (rest > 0.0).then(|| self.slope / rest)

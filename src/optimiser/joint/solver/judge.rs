@@ -171,14 +171,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the current chain can still become the best chain. Such a chain is improved again.
+    /// Returns true if the current chain can still become the best chain. Its relays are then moved again.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current chain can no longer become the best chain. Its improvement then stops. `turn` is the
-    /// next action of the improvement.
+    /// Returns true if the current chain can no longer become the best chain. The moves of its relays then end. `turn`
+    /// is the next action in the computation of these moves.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -213,15 +213,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays in a chain whose relays are moved singly, after the last initial chain. In a chain with
-/// fixed altitudes of some relays there is no maximum.
+/// Maximum number of relays in a chain whose relays are moved singly. Single relays are moved after the search over the
+/// initial chains. In a chain with fixed altitudes of some relays there is no maximum.
 const POLISHED: u16 = 5;
 
-/// Number of times that the trial moves of single relays are halved. Single relays are moved after the last initial
-/// chain.
+/// Number of times that the trial moves of single relays are halved. Single relays are moved after the search over the
+/// initial chains.
 const HALVINGS: u16 = 12;
-/// First trial move of a single relay, as a fraction of its allowed range. Single relays are moved after the last
-/// initial chain.
+/// First trial move of a single relay, as a fraction of its allowed range. Single relays are moved after the search
+/// over the initial chains.
 const FIRST_MOVE: f32 = 0.25;
 
 /// Minimum gain of the target for which a trial move of a relay is accepted, in ln(SIR).
@@ -289,7 +289,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Begins the improvement of the next initial chain, or ends the search after the last one.
+    /// Begins the moves of the relays of the next initial chain. Ends the search after the last initial chain.
     pub(super) fn begin(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,

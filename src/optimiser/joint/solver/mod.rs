@@ -74,7 +74,7 @@ enum Work {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Search for the highest target that an initial chain meets.
+    /// Search for the highest target SIR of an initial chain, before its relays are moved.
     Start,
     /// Search for the highest target that the current chain meets without moves of its relays.
     Raise,
@@ -83,7 +83,7 @@ enum Purpose {
     /// Search for the highest target of a chain once its relays were moved. Hops are computed as for these moves, not
     /// exactly as in flight.
     Judge,
-    /// Search for the highest target of an improved chain, with the hops computed exactly as in flight.
+    /// Search for the highest target of a chain once its relays were moved. Hops are computed exactly as in flight.
     Last,
     /// Check if the chain reaches the SIR's upper bound of all chains. Hops are computed exactly as in flight.
     Probe,
@@ -111,8 +111,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Highest target that the improvement of any chain has reached, ln(SIR). A chain that is predicted to end below it
-    /// is dropped.
+    /// Highest target that any chain has reached by moves of its relays, in ln(SIR). A chain that is predicted to end
+    /// below it is dropped.
     highest: f32,
     best_cells: Cells<RELAYS>,
     /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for this chain's highest
@@ -136,13 +136,14 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     holds_back: bool,
     /// True if the minimum separation of relays has restricted the improvement of any chain.
     walled: bool,
-    /// Number of the next trial move of a single relay in the last phase; see [`OneWay::move_of`].
+    /// Number of the next trial move of a single relay; see [`OneWay::move_of`]. Single relays are moved after the
+    /// search over the initial chains.
     moving: u16,
-    /// Number of accepted trial moves in the last phase.
+    /// Number of accepted trial moves of single relays, after the search over the initial chains.
     moved: u8,
     /// Lateral offset and altitude of a relay before its current trial move.
     kept: Cell,
-    /// Number of the segment whose computed moves are in memory; `None` if there is none.
+    /// Number of the segment (ten relays) whose computed moves are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
@@ -245,7 +246,7 @@ enum Way<const RELAYS: usize, const SEGMENTS: usize> {
     Fitted([Fitted<RELAYS>; FITTED]),
 }
 
-/// Joint solver of a chain of at most `RELAYS` relays, for one direction or both.
+/// Joint solver of a chain of at most `RELAYS` relays, for data in one direction or in both directions.
 ///
 /// `SEGMENTS` is at least a tenth of `RELAYS`, since a segment has ten relays.
 #[derive(Clone, Debug)]

@@ -192,8 +192,8 @@ const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and
-    /// altitudes stay unchanged. Stores the chain if `kept` is true. At the end of the pass returns the chain's slack,
-    /// m, or `None` if a hop cannot meet the target.
+    /// altitudes stay unchanged. Stores the chain if `kept` is true. At the end of the pass returns the chain's slack
+    /// (the length by which it overshoots Rx), m, or `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
