@@ -26,7 +26,7 @@ pub struct Bearing {
 }
 
 impl Bearing {
-    /// Returns the bearing of a position `ahead_m` farther along x, `aside_m` along y, and `climb_m` up.
+    /// Returns the bearing of a position `ahead_m` along x, `aside_m` along y, `climb_m` up from a relay.
     ///
     /// `None` if the distance is zero or overflows, or if a value is not finite.
     ///

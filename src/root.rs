@@ -7,8 +7,8 @@
 /// Returns the square root of `x`, within one unit in the last place of an f32.
 ///
 /// The result is 0 for `x` below the smallest normal f32. The function takes 18 instructions on a Cortex-M4F.
-/// `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa. It tests two octaves, because
-/// a factor of 4 changes only the exponent of the result.
+/// `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa. It tests all numbers from 1
+/// to 4, because a factor of 4 changes only the exponent of the result.
 #[inline(never)] // called from many places: 2.4 KB of flash otherwise
 pub fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)
@@ -34,7 +34,8 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// It searches the value up to which `holds` returns true. `holds` must return true for `low` and false for `high`.
+/// The ends enclose the number up to which `holds` returns true. `holds` must return true for `low` and false for
+/// `high`.
 pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bool) -> (f32, f32) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {

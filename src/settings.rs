@@ -12,7 +12,8 @@ use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
 
-/// Time for computation and the link's buffers in the `hop_time` of the preset settings.
+/// Part of the presets' `hop_time` for computation and link buffers. The presets are `Settings::wires` and
+/// `Settings::radio`.
 const LATENCY: Duration = Duration::from_millis(10);
 
 /// Identity of a relay: its network's number, and its index in the chain.
@@ -162,7 +163,8 @@ pub struct Settings {
     #[cfg(feature = "departures")]
     pub respacing: Duration,
     /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
-    /// its drone, which still waits at its position. At an end of the chain they come within a few metres.
+    /// its drone, which still waits at its position. At an end of the chain, a neighbour comes within a few metres of
+    /// it.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
@@ -237,8 +239,8 @@ impl Settings {
         Self::DEFAULT.with_hop_time(alone, baud)
     }
 
-    /// Returns settings for relays that share one half-duplex radio channel of `baud` bit/s. `load` is the number of
-    /// relays in range of each other, with the overhead of a frame.
+    /// Returns settings for relays that share one half-duplex radio channel of `baud` bit/s. `load` has the number of
+    /// relays in range of each other, and the overhead of a frame.
     ///
     /// `probe_after` is 5 s, or longer if the channel would be overloaded with 5 s ([`ChannelLoad::carried`]).
     /// `dead_after` is three times `probe_after`. `hop_time` is the value of [`ChannelLoad::hop_time`] with a latency

@@ -34,12 +34,13 @@ pub fn quiet(mission: &Mission, at: Placement) -> f32 {
 }
 
 /// Returns the inverse of interference plus noise, s / (1 + nu s), m^2. `s` is the squared distance from the
-/// interferer, m^2, and `nu` the noise, 1/m^2.
+/// interferer, m^2. `nu` is the noise divided by the interferer's power received at 1 m, 1/m^2.
 pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
     if nu > 0.0 { s / (1.0 + nu * s) } else { s }
 }
 
-/// Sending node of a hop: lateral offset, altitude, and transmit power relative to the interference.
+/// Sending node of a hop: its lateral offset, its altitude and its gain. A hop's SIR is the gain times the inverse
+/// interference, divided by the squared length. The gain contains the node's transmit power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {

@@ -37,7 +37,7 @@ pub struct Report {
     pub neighbours: [Option<u16>; 2],
     /// Flags for the neighbours toward Tx and toward Rx: true if the relay does not receive it now.
     pub silent: [bool; 2],
-    /// True if the relay has received a second node with its number within three times `dead_after`.
+    /// True if a second node with this relay's number was received in the last three times `dead_after`.
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a position that is not the setpoint sent by the relay.
     pub refuses_setpoint: bool,
@@ -104,7 +104,7 @@ fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
 }
 
 impl Report {
-    /// Creates the report of one relay from its `entry` of time `at` and its last details.
+    /// Creates the report of one relay from its state `entry` at the time `at`, and its last `detail`.
     ///
     /// Not part of the public interface: tests and tools of this workspace decode captures with it.
     #[doc(hidden)]

@@ -11,7 +11,7 @@ use crate::root::sqrt;
 /// Number of target SIRs in a full ladder, the list of targets of one sweep along the chain.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps above target 7 in a full ladder, the list of targets 0 to 15.
+/// Number of gaps between targets 7 and 15 of a full ladder, a list of the targets 0 to 15.
 const HALF: usize = TARGETS / 2;
 
 /// Ladder: rising list of target SIRs, linear, for one pass along the chain (a sweep). Encoded as one target and two
@@ -19,8 +19,8 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Eighth of the 16 targets, linear SIR: the lower of the two middle targets. If the list has one target, that
-    /// target.
+    /// Eighth of the 16 targets, linear SIR: the lower of the two middle targets. In a list of one target, `anchor` is
+    /// this target.
     anchor: f32,
     /// Code of the relative gap between the two middle targets: their difference divided by the lower one. The code is
     /// a float of 5 exponent and 3 mantissa bits. With code 0, `anchor` is the only target.
@@ -76,7 +76,8 @@ impl Ladder {
     }
 
     /// Returns 16 targets (a ladder) that are dense around `centre` and span [`low`, `high`]. `centre` is in the middle
-    /// of a gap; this gap is `gap` times its lower target wide. The gaps grow outward from it.
+    /// of a gap between two targets. This gap is `gap` times its lower target wide. All other gaps grow with their
+    /// distance from it.
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);

@@ -21,7 +21,8 @@ use crate::place::{CrossSection, Placement};
 use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
-/// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
+/// Number of altitudes in one round of the coarse-to-fine search for a relay's best position. The search is a part of
+/// Algorithm 2.
 const ROWS: u8 = 5;
 
 /// Number of rounds of the coarse-to-fine search. Each round halves the range of altitudes.
@@ -30,8 +31,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals of x before the interferer, and beyond it, for data in both directions. The search
-/// evaluates both hops at the ends of the intervals.
+/// Number of equal intervals of x on each side of the interferer, toward Tx and toward Rx. Used for data in both
+/// directions: the search evaluates both hops at the ends of the intervals.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -231,7 +232,8 @@ pub struct LocalSearch {
     found: Option<Placement>,
     /// Linear SIR of the worse hop at the best position found; at the current position if none is found.
     best_sir: f32,
-    /// Number of evaluations at the current altitude. The count stays 0 in a mission with data in one direction.
+    /// Number of evaluations of both hops at the current altitude. The count stays 0 in a mission with data in one
+    /// direction.
     evaluations: u16,
 }
 
@@ -264,8 +266,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus those for one altitude. One altitude
-    /// takes 24 evaluations, or 194 for data in both directions.
+    /// Continues the search until `budget` evaluations of both hops are used. The search at an altitude is completed,
+    /// even if it needs more: 24 evaluations, or 194 for data in both directions.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -307,8 +309,8 @@ impl LocalSearch {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the best x at the next altitude of the coarse-to-fine search. Returns the number of evaluations, or
-    /// `None` after the last round.
+    /// Searches the best x at the next altitude of the coarse-to-fine search. Returns the number of evaluations of both
+    /// hops, or `None` after the last round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;
@@ -337,8 +339,8 @@ impl LocalSearch {
         })
     }
 
-    /// Searches the best x at `altitude_m`. For data in one direction both hops usually have equal SIRs there. Returns
-    /// the SIR of the worse hop at the best x found, or -1 if no x is allowed.
+    /// Searches the best x at `altitude_m`. For data in one direction, both hops usually have equal SIRs at the best x.
+    /// Returns the SIR of the worse hop at the best x found, or -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;

@@ -28,12 +28,12 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions at which the last relay tries to receive Rx well enough. Used only for data in both
+/// Maximum number of x that the last relay tries, to receive Rx with the required SIR. Used only for data in both
 /// directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of field points that one call evaluates. The evaluation of one target is completed even if it needs
-/// more.
+/// Maximum number of points of the interference field that one call evaluates. The evaluation of one target is
+/// completed even if it needs more.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Previous relay of a pass along the chain, as its message describes it.
@@ -48,7 +48,8 @@ pub struct Behind {
 }
 
 impl Behind {
-    /// Returns a previous relay with the altitude and power `profile`, on the line, without a measurement.
+    /// Returns a previous relay with the altitude and power `profile`, vertically above the line Tx to Rx. It has no
+    /// measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -57,7 +58,8 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all data for its reach at a target SIR.
+/// Relay in a pass along the chain, with all data to compute its reach for a target SIR. The reach is the x farthest
+/// along the pass at which the relay meets the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
@@ -74,11 +76,11 @@ pub struct Link<'a> {
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stop before
     /// that x to help the next relay on the pass.
     pub plain: bool,
-    /// Maximum x of the relay, m, which leaves the relays toward Rx room for their separation. `None` unless the joint
+    /// Maximum x of the relay, m. It leaves the relays toward Rx space for their separation. `None` unless the joint
     /// method has computed it. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// Fixed x of this relay, m. It is the relay's reach for every target that the hop to this x meets. `None` unless
-    /// the mission has fitted slots (time slots as long as each hop needs).
+    /// Fixed x of this relay, m; `None` unless the mission has fitted slots (as long as each hop needs). The relay has
+    /// this x for every target that its hop meets there.
     pub fixed_m: Option<f32>,
 }
 
@@ -97,7 +99,8 @@ pub fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends to `reaches` this relay's reaches for all `targets` whose reach is not in the list yet.
+    /// Appends this relay's reaches for all `targets` whose reach is not in the list `reaches` yet. A reach is the x
+    /// farthest along the pass at which the relay meets a target.
     ///
     /// `targets` is in ascending order, and entry i of each list belongs to target i. `from` has the reaches of the
     /// previous relay of the pass, m. The list ends before the first target that cannot be met. Work for each target:
@@ -145,8 +148,8 @@ impl<'a> Link<'a> {
     }
 
     /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
-    /// computes 16 reaches. In an interference field it stops after 128 evaluations of field points, but computes at
-    /// least one reach.
+    /// computes 16 reaches. In an interference field it stops after it has evaluated 128 points of the field, but
+    /// computes at least one reach.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -232,8 +235,8 @@ impl<'a> Link<'a> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay that meets `target` at the smallest x of this relay. The receiver is at an x
-    /// from `low` to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop from this relay with the smallest x of this relay among all hops that meet `target`. The
+    /// receiver is at an x from `low` to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -256,10 +259,10 @@ impl<'a> Link<'a> {
 
     /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// `reach` is this relay's reach, and `from_m` the reach of the previous relay. `None` if the target cannot be met
-    /// at any position of this relay. For a pass toward Rx the slack is `reach` plus the maximum length of the last
-    /// hop, minus D. For a pass toward Tx the slack is the maximum length of the first hop minus this relay's x; the x
-    /// is chosen so that the slack is largest.
+    /// `reach` is this relay's reach (its x farthest along the pass for the target), and `from_m` the previous relay's.
+    /// `None` if the target cannot be met at any x. Toward Rx, the slack is `reach` plus the maximum length of the last
+    /// hop, minus D. Toward Tx, it is the maximum length of the first hop minus this relay's x, chosen for the largest
+    /// slack.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -309,7 +312,8 @@ impl<'a> Link<'a> {
     }
 
     /// Returns the largest x, m, at which this relay receives the previous relay of the pass. It is at most `most_m`.
-    /// The previous relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
+    /// The previous relay may take any x up to `from_m`, the farthest x at which it meets the target. `None` if there
+    /// is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -317,9 +321,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for data in both directions. `hop` leads from Rx to this
-    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay's x is less than `reach` if its
-    /// SIR from Rx would be too low at `reach`.
+    /// Returns the chain's slack and this last relay's x, m, for data in both directions. The slack is the maximum
+    /// length of the chain minus D. `hop` leads from Rx to this relay, and `slack` returns the slack toward Rx for an x
+    /// of this relay. The relay's x is less than `reach` if its SIR from Rx would be too low at `reach`.
     fn held(
         &self,
         hop: &FromRx,
@@ -352,9 +356,9 @@ impl<'a> Link<'a> {
 
     /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
     ///
-    /// `from_m` is the farthest x of the previous relay. `None` if the previous relay has no such position. The search
-    /// assumes that the possible positions of the previous relay are one interval, although this interval can have
-    /// gaps. Work: at most two reaches; in an interference field three for each of its points.
+    /// `from_m` is the farthest x of the previous relay that meets `target`. `None` if the previous relay has no
+    /// suitable x. The search assumes that its suitable x are one interval without gaps, which is not always true.
+    /// Work: at most two reaches; in an interference field three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -417,8 +421,9 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the reaches
-/// of this relay, and `from` those of the previous relay of the pass, m.
+/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` has the x
+/// farthest along the pass, m, at which this relay meets each target. `from` has those of the previous relay of the
+/// pass.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -430,22 +435,24 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
+/// Result of a sweep (a pass of target SIRs): the chain's slacks, and the target to commit, if any. A slack is the
+/// maximum length of a chain that meets a target, minus the distance from Tx to Rx.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
     /// Index of the committed target in the pass's list of targets. The relays take their positions for this target.
     /// `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
-    /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
-    /// target.
+    /// Slack of the chain for each target that every hop can meet, m. The slack is the maximum length of the chain
+    /// minus the distance from Tx to Rx. It is 0 or more if the chain meets the target.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
     /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's slacks, m, one for each of its `targets`.
     ///
-    /// The highest target that the chain meets is committed in two cases: the next higher target is missed and within the mission's
-    /// tolerance; or the ladder has a single target, as in the paper's Algorithm 1.
+    /// The highest target that the chain meets is committed in two cases. The chain misses the next higher target, and
+    /// their relative difference is within the mission's tolerance; or the ladder has a single target, as in the
+    /// paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -473,7 +480,8 @@ impl Verdict {
 }
 
 /// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
-/// is 0 or more. Lower targets that are missed, in a varying field or at different altitudes, count as well.
+/// is 0 or more. A lower target that is missed counts as well; this can happen in a varying field or at different
+/// altitudes.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -500,7 +508,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns this chain with relays that all take their farthest x.
+    /// Returns this chain for a plain pass: every relay takes the farthest x that meets the target.
     pub const fn plainly(&self) -> Self {
         Self::new(self.mission, self.target, true, self.profile_of)
     }
@@ -519,7 +527,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
+    /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target. A reach is the x
+    /// farthest along the pass at which the relay meets the target.
     ///
     /// Each item has the index of a relay, the reach of the previous relay of the pass, m, and the reach of this relay,
     /// m.
@@ -533,8 +542,9 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. With `index` 0,
-    /// the result is `Some` if all relays can, whatever the number.
+    /// Returns the reach of relay `index`, m, if all relays can be at their reaches; otherwise `None`. A reach is the x
+    /// farthest along the pass that meets the target. For `index` 0, the result is an arbitrary number if all relays
+    /// can.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -553,8 +563,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         None
     }
 
-    /// Returns the reach of relay `index`, m. If `index` is `None`, it returns the x at which the pass starts. The
-    /// result is `None` if a hop cannot meet the target.
+    /// Returns the reach of relay `index`, m: the x farthest along the pass that meets the target. For `index` `None`,
+    /// it returns the x at which the pass starts. The result is `None` if a hop cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let Some(index) = index else {
             return Some(origin(self.mission));
@@ -563,8 +573,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. With `index` 0, the
-    /// result is `Some` if all relays can, whatever the number.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take the x that the target requires. For `index`
+    /// 0, the result is an arbitrary number if all relays can.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -589,10 +599,10 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
     /// x = `place`, m.
     ///
-    /// `visit` gets the index of a relay, the x of this relay, and the index of the previous relay of the pass. It
-    /// returns the reach of the previous relay, m; if there is none, the x at which the pass starts. The result is the
-    /// x required before the first relay. It is `None` if some relay cannot take its required position, or if `visit`
-    /// returns `None`.
+    /// `visit` gets a relay's index, its x, and the index of the previous relay of the pass. It returns the previous
+    /// relay's farthest x that meets the target, m; without such a relay, the x at which the pass starts. The result is
+    /// the x required before the first relay; `None` if a relay cannot take the required x, or if `visit` returns
+    /// `None`.
     pub fn settle(
         &self,
         place: f32,

@@ -20,8 +20,8 @@ pub struct Agreed {
     pub commit: u8,
     /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
-    /// Target SIR that no chain with the relays' altitudes can meet, linear. `None` with the paper's fixed step,
-    /// because its passes do not try all chains. `None` also for data in both directions.
+    /// Target SIR that no chain with the relays' altitudes can meet, linear. `None` with the paper's fixed-step
+    /// schedule, because its passes do not try all chains. `None` also for data in both directions.
     pub most: Option<f32>,
     /// Number of passes along the chain that the search took.
     pub sweeps: u32,
@@ -33,7 +33,7 @@ pub struct Agreed {
 pub struct Planner {
     search: Search,
     reaches: PerTarget,
-    /// Farthest x of the current relay for each target, m; the list grows from call to call.
+    /// Farthest x at which the current relay meets each target, m; the list grows from call to call.
     next: PerTarget,
     index: u16,
     behind: Option<Behind>,
@@ -123,9 +123,10 @@ impl Planner {
     }
 }
 
-/// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
+/// Solves the chain in one call. With [`Schedule::Bracketed`], it takes at most about fifty passes over N hops.
 ///
-/// If some relays have to stop before their farthest x, the function also checks that they can stop there.
+/// If some relays have to stop before the farthest x that meets the target, the function also checks that they can stop
+/// there.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.

@@ -137,7 +137,8 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with a sender at any x down to 0. No x is left free for relays closer to Tx.
+    /// Returns this hop with a sender at any x down to 0. The hop then leaves no space along x for the relays closer to
+    /// Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -145,8 +146,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest permitted x of the receiver, m. It is the sender's smallest permitted x plus the minimum
-    /// step.
+    /// Returns the smallest permitted x of the receiver, m. It is the sender's smallest permitted x plus the hop's
+    /// minimum length along x.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -156,7 +157,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
+    /// Returns the smallest x, up to `from_m`, from which the sender meets `target`. `None` if there is none. The x is
+    /// not below the sender's smallest permitted x.
     ///
     /// `target` is a linear SIR above zero. `from_m` is the receiver's x, from 0 to the x of Rx, m. `quiet` is above
     /// 0: Upsilon = E[1/I] at the receiver divided by the field's largest Upsilon, and 1 at Rx. The result is rounded
@@ -226,8 +228,9 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest x of this hop's receiver, m, with which the backward hop meets `target`. This hop's sender
-    /// is at x = `place`. The result is infinite for data in one direction, and -infinite if no x meets `target`.
+    /// Returns the largest x of this hop's receiver, m, from which the backward hop meets `target`. This hop's sender
+    /// is at x = `place`, and receives the backward hop. The result is infinite for data in one direction, and
+    /// -infinite if no x meets `target`.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;
@@ -442,7 +445,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the part of the field from `start_m`, m, to the next point of the field or to `end_m`.
+    /// Returns the part of the field from `start_m`, m, to the next point of the field, at most to `end_m`.
     #[inline(never)] // one copy for all loops
     fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {

@@ -100,7 +100,8 @@ impl Back {
         })
     }
 
-    /// Returns the squared maximum length of a backward hop to a receiver at `x_m`, times the target, m^2.
+    /// Returns the target SIR times the squared maximum length of a backward hop to `x_m`, m^2. The product is the same
+    /// for all targets.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;

@@ -76,10 +76,11 @@ const MOST_SWEEPS: u32 = 48;
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound of the chain's SIR, linear. This is the maximum SIR of the hop between the leader and the nearer
-    /// end, Tx or Rx.
+    /// Upper bound of the chain's SIR, linear. This is the maximum SIR of the hop between the leader and the end of the
+    /// chain (Tx or Rx) next to it.
     ceiling: f32,
-    /// First target of the fixed-step schedule (gamma_0 of the paper), or upper bound of the bracketed one.
+    /// First target of the fixed-step schedule (gamma_0), or upper bound of the bracketed schedule. The paper defines
+    /// gamma_0.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
@@ -161,8 +162,8 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next list of targets by `ladder`, which the leader expects to end the search. If `ladder` is for a
-    /// plain pass, all later passes are plain, too.
+    /// Replaces the next list of targets by `ladder`. The leader expects that the pass with these targets ends the
+    /// search. If `ladder` is for a plain pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
@@ -185,8 +186,8 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues the search after a pass. `slacks` are the chain's slacks, m, one for each target that every hop can meet. These targets
-    /// are the first ones of [`Search::ladder`].
+    /// Continues the search after a pass. `slacks` are the chain's slacks, m: for each target that every hop can meet,
+    /// the maximum length minus the distance from Tx to Rx. These targets are the first ones of [`Search::ladder`].
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
@@ -307,7 +308,8 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target).
+/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target). The slack is the maximum
+/// length of the chain minus the distance from Tx to Rx.
 ///
 /// The cubic curve passes through the four points next to the change of sign. `None` if a straight line gives a very
 /// different target: the slack then jumps, and no interpolated target is meaningful.

@@ -93,8 +93,8 @@ pub struct Hop {
     from_tx: bool,
     /// Largest permitted x of this hop's receiver, m; Tx is at x = 0.
     end_m: f32,
-    /// Maximum x of the receiver, and maximum x of the sender, m. Up to these x, the relays nearer to Rx fit with their
-    /// minimum separation.
+    /// Maximum x of the receiver, and maximum x of the sender, m. Each of them leaves the relays nearer to Rx space for
+    /// their minimum separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a mission without data from Rx to Tx.
     back: Option<Back>,
@@ -172,7 +172,8 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a receiver at any x up to the x of Rx. No x is left free for relays nearer to Rx.
+    /// Returns this hop with a receiver at any x up to the x of Rx. The hop then leaves no space along x for the relays
+    /// nearer to Rx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -184,7 +185,8 @@ impl Hop {
         Self { end_m, ..self }
     }
 
-    /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m. `None` if there is none.
+    /// Returns the largest x from `from_m` to the hop's limit at which the receiver meets `target`, m. `None` if there
+    /// is none.
     ///
     /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to the x of Rx. The result is rounded
     /// toward the sender, so it meets the target as an f32. Constant work; with noise at most 96 evaluations of the
@@ -263,8 +265,8 @@ impl Hop {
     /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`].
     /// `None` if no x meets `target`.
     ///
-    /// If the receiver has such a position at least the minimum step beyond `from_m`, the result is [`Hop::reach`]
-    /// for a sender at `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.
+    /// If the receiver has such a position for a sender at `from_m`, separated from it, the result is [`Hop::reach`]
+    /// for this sender. Otherwise the sender is before the receiver by their minimum distance along x. Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self
             .reach(target, from_m)
@@ -276,8 +278,8 @@ impl Hop {
     }
 
     /// Returns the receiver's largest x, m, at which the hop meets `target` in both directions of data. The sender is
-    /// in [0, `from_m`]. `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The
-    /// result is larger than `place` if a sender at a smaller x receives the backward hop better.
+    /// in [0, `from_m`], and receives `back`, the backward hop. `place` is the receiver's largest x for a sender at
+    /// `from_m`. The result is larger if a smaller x of the sender gives the backward hop a better SIR.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -297,8 +299,8 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x, m, at which the hop meets `target` in both directions of data. It is at most
-    /// `near`. `None` if there is none. The receiver is at x = `place`.
+    /// Returns the sender's largest x, m, at which the hop meets `target` in both directions of data. The result is at
+    /// most `near`. `None` if there is none. The receiver is at x = `place`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -407,8 +409,8 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. So the result
-    /// is a smooth function, as the joint method requires.
+    /// Returns the largest x at which the receiver meets `target`, m, without a minimum separation. So the result is a
+    /// smooth function, as the joint method requires.
     ///
     /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance perpendicular to
     /// x alone exceeds the hop's maximum length.
@@ -504,8 +506,8 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns the receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2. Without the feature
-    /// `noise` it is the constant 0, so that the compiler drops the search in noise.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2. It is the constant 0
+    /// without the feature `noise`, so that the compiler drops the code for hops with noise.
     fn nu(&self) -> f32 {
         if NOISE { self.noise } else { 0.0 }
     }

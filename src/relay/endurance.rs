@@ -18,16 +18,18 @@ const STALE: Duration = Duration::from_millis(10_000);
 const REVIEW: Duration = Duration::from_millis(1_000);
 /// Time for which a condition must hold before it causes an action.
 const HOLD: Duration = Duration::from_millis(15_000);
-/// Hysteresis of the margin. Also the maximum difference of two endurance values that agree, and the minimum change of a request that is
-/// sent to the leader.
+/// Hysteresis in the comparison of the margin with its limits. Also the maximum difference of two endurance values that
+/// agree, and the minimum change of a request that is sent to the leader.
 const STEP: Duration = Duration::from_millis(30_000);
 /// Minimum time between two events `EnduranceUnknown`, and between two events `AtReserve`.
 const AGAIN: Duration = Duration::from_millis(60_000);
 /// Usual duration of the replacement of a drone, in units of `dead_after`.
 ///
-/// It takes 8 units until the leader's order to leave, and 4 more until the relays of the view without this relay are in place.
+/// The leader's order to leave comes after 8 units. After 4 more units, the other relays are in place, in a view (list
+/// of members) without this relay.
 const REPLACEMENT: u32 = 12;
-/// Maximum duration of the replacement of a drone that the limit of the margin includes.
+/// Maximum value of the time for a drone's replacement in the limit of the margin. The margin is the remaining flight
+/// time minus the time of the way home.
 const LONGEST: Duration = Duration::from_millis(240_000);
 /// Maximum interval at which the pilots of drones with equal endurance are told to leave, one by one.
 const APART: Duration = Duration::from_millis(10_000);
@@ -37,13 +39,15 @@ const MAX_S: f32 = 21_600.0;
 #[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Endurance {
-    /// Flight time to keep beyond the way home; `None` if the relay does not request to leave by itself.
+    /// Flight time to keep in addition to the way home; `None` if only the firmware requests to leave.
     reserve: Option<Duration>,
-    /// End of the flight and time of the way home, by the last valid value; `None` before a valid value.
+    /// End of the drone's flight time, and time of its way home, both from the last valid value. `None` before a valid
+    /// value.
     end: Option<(Instant, Duration)>,
     /// Time at which the relay received the last valid value.
     sampled_at: Instant,
-    /// Last end of the flight that agreed with the previous value, within [`STEP`]. 0 if no value has agreed since the last pause of 10 s.
+    /// Last end of the flight that agreed with the value before it, within [`STEP`]. 0 if no value has agreed since the
+    /// last 10 s without a value.
     confirmed: Instant,
     /// True from the time at which the endurance becomes unknown to the next valid value.
     is_lost: bool,
@@ -52,17 +56,17 @@ pub(super) struct Endurance {
     raised_at: [Instant; 2],
     /// Limit of the margin that `Relay::stay` has set; `None` to use the usual limit.
     limit: Option<Instant>,
-    /// Times since which four conditions hold; 0 for a condition that does not hold. The conditions are: the relay has to request to leave
-    /// or withdraw its request; the margin is at the floor; the leader has to receive a changed request; the margin is clearly above the
-    /// floor.
+    /// Start times of four conditions; 0 for a condition that does not hold. In order: a request to leave has to be
+    /// made or withdrawn; the margin is at the floor; the leader has to receive a changed request; the margin is
+    /// clearly above the floor.
     since: [Instant; 4],
     /// True if this module has made the request to leave; false if the firmware has made it.
     is_own: bool,
     /// True from a margin at or below the floor until the margin is [`STEP`] above the floor. The floor is the margin at which `AtReserve`
     /// is raised.
     is_spent: bool,
-    /// True after a landing at the reserve, or with a request of this module to leave. False again once there is no request, or the margin
-    /// is [`STEP`] above the floor.
+    /// True after a landing of the drone, either at the reserve or with this module's request to leave. False again
+    /// once there is no request, or the margin is [`STEP`] above the floor.
     keeps_out: bool,
     /// Time at which only the way home and the reserve will be left, as last sent to the leader.
     floor_at: Instant,
@@ -76,8 +80,8 @@ impl Endurance {
         usual.since(Instant::ZERO).min(LONGEST)
     }
 
-    /// Returns the margin below which the relay requests to leave; `None` without a reserve. The margin, a time from 0, is the remaining
-    /// flight time minus the time of the way home.
+    /// Returns the margin below which the relay requests to leave; `None` without a reserve. The margin is the
+    /// remaining flight time minus the time of the way home. The result stands for a duration, counted from time 0.
     fn limit(&self, settings: &Settings) -> Option<Instant> {
         let usual = Instant::ZERO + self.reserve? + Self::replacement(settings);
         Some(self.limit.map_or(usual, |lower| lower.min(usual)))
@@ -93,8 +97,8 @@ impl Endurance {
         now.since(self.sampled_at) >= STALE
     }
 
-    /// Returns the margin as a time from 0, so that durations can be added; `None` before a valid value. The margin is the remaining flight
-    /// time minus the time of the way home.
+    /// Returns the margin, the remaining flight time minus the time of the way home, counted from time 0. It is an
+    /// `Instant`, so that durations can be added. `None` before a valid value.
     fn margin(&self, now: Instant) -> Option<Instant> {
         let (end, home) = self.end?;
         let is_confirmed = self.is_old(now) && self.confirmed > Instant::ZERO;
@@ -112,7 +116,8 @@ impl Endurance {
         }
     }
 
-    /// Raises `event`, at most once per minute ([`AGAIN`]). `which` is the index of the event's last time.
+    /// Raises `event`, at most once per minute ([`AGAIN`]). `which` is the index in `raised_at` of the time at which
+    /// this event was last raised.
     fn raise(&mut self, now: Instant, node: &mut Node, which: usize, event: Event) {
         if let Some(last) = self.raised_at.get_mut(which)
             && (*last == Instant::ZERO || now.since(*last) >= AGAIN)
@@ -124,8 +129,8 @@ impl Endurance {
 
     /// Records if the condition with the index `which` holds (`is_true`). Returns true once it decides: it must hold for 15 s.
     ///
-    /// A single endurance value is not enough: another value must agree with it, or a value must be received after the condition began.
-    /// There is one exception: a single value decides if `is_low` is true, once this value is [`STALE`].
+    /// A single endurance value is not enough: another value must agree with it, or a value must be received after the
+    /// condition began. Exception: if `is_low` is true, a single value is enough once it is [`STALE`].
     fn holds(&mut self, now: Instant, which: usize, is_true: bool, is_low: bool) -> bool {
         let is_sure =
             self.end.is_some_and(|(end, _)| end == self.confirmed) || is_low && self.is_old(now);
@@ -137,7 +142,8 @@ impl Endurance {
         is_true && now.since(at) >= HOLD && (is_sure || at < self.sampled_at)
     }
 
-    /// Compares the margin with the limit and the floor. Requests to leave, or withdraws this request.
+    /// Compares the margin with its limit and its floor. At the floor, `AtReserve` is raised. Requests to leave below
+    /// the limit, or withdraws this request.
     fn review(&mut self, now: Instant, node: &mut Node) {
         if self.end.is_some() && self.is_old(now) {
             self.lose(now, node);
@@ -252,8 +258,8 @@ impl Relay {
         endurance.review(now, &mut self.node);
     }
 
-    /// Sets the reserve: the flight time to keep beyond the way home and the time of a replacement. With `None`, the initial value, the
-    /// relay does not request to leave by itself.
+    /// Sets the reserve: flight time to keep in addition to the way home and the time of a replacement. With `None`,
+    /// the initial value, the relay does not request to leave by itself.
     pub fn set_reserve(&mut self, reserve: Option<Duration>) {
         if let Some(endurance) = self.endurance.first_mut() {
             endurance.reserve = reserve;

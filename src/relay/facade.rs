@@ -336,7 +336,8 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the votes on views if they have changed and must be stored; otherwise `None`.
+    /// Returns this relay's votes on views (lists of members) if they have changed and must be stored. Otherwise
+    /// returns `None`.
     ///
     /// [`poll_transmit`](Self::poll_transmit) returns no frame until the firmware has confirmed by
     /// [`persisted`](Self::persisted) that they are stored. A relay without its votes after a restart could vote twice,
@@ -358,7 +359,7 @@ impl Relay {
         self.node.unpersisted()
     }
 
-    /// Returns the current votes on views, stored or not.
+    /// Returns this relay's current votes on views (lists of the chain's members), stored or not.
     ///
     /// A firmware can store them at the start, so that a fault of the storage shows before flight. Takes constant time.
     pub const fn view_record(&self) -> ViewRecord {
@@ -373,8 +374,8 @@ impl Relay {
         self.node.persisted(record);
     }
 
-    /// Passes the votes on views to `store` if they are not stored yet. If `store` returns true, the votes count as
-    /// stored.
+    /// Passes this relay's votes on views (lists of members) to `store` if they are not stored yet. If `store` returns
+    /// true, the votes count as stored.
     ///
     /// See [`unpersisted`](Self::unpersisted).
     pub fn persist(&mut self, mut store: impl FnMut(&ViewRecord) -> bool) {
@@ -529,10 +530,10 @@ impl Relay {
 
     /// Returns true while this relay is passive, because a second node with its number has precedence.
     ///
-    /// Each node draws a random claim number at its start. Of two nodes with the same node number, the larger epoch has
-    /// precedence, then the larger claim number. A passive relay has no setpoint and takes no part in the protocol. It
-    /// becomes active once the other node has been silent for twice `Settings::dead_after`, or when
-    /// [`clear_duplicate_index`](Self::clear_duplicate_index) is called.
+    /// Each node draws a random claim number at its start. Of two nodes with the same node number, the one with the
+    /// larger epoch (start counter) has precedence, then the one with the larger claim number. A passive relay has no
+    /// setpoint and takes no part in the protocol. It becomes active once the other node has been silent for twice
+    /// `Settings::dead_after`, or when [`clear_duplicate_index`](Self::clear_duplicate_index) is called.
     pub fn is_passive(&self) -> bool {
         self.node.is_passive()
     }
@@ -735,8 +736,8 @@ impl Relay {
     /// [`handle_control`](Self::handle_control).
     ///
     /// The guard (collision avoidance) no longer keeps clear of these relays. If the view still has relays on that
-    /// side, the drone does not move toward them before the guard has received the nearest of them. If that relay is
-    /// lost before, call the function again. Takes constant time.
+    /// side, the drone does not move toward them before the guard has received a message of the nearest of them. If the
+    /// nearest relay is lost before its message, call the function again. Takes constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }

@@ -50,12 +50,13 @@ use crate::place::Placement;
 /// variance, the leader searches for a faulty relay.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum drop of the fit's residual without the faulty relay. The unit is the variance of the remaining measurements.
+/// Minimum drop of the fit's residual that shows a faulty relay, when the fit leaves out this relay. The unit is the
+/// variance of the remaining measurements.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual of the fit that can show a faulty relay. Also the minimum drop of the residual without that relay.
-/// The residual is the sum of squared relative errors. A single measurement with an error of some 15 % causes this
-/// residual.
+/// Minimum residual of the fit that can show a faulty relay. It is also the minimum drop of the residual when the fit
+/// leaves out this relay. The residual is the sum of squared relative errors. A single measurement with an error of
+/// some 15 % causes this residual.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of the second smallest variance to the smallest that identifies a faulty relay. Each variance belongs
@@ -70,8 +71,9 @@ const CONSISTENT: f64 = 0.1;
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits of the squared difference at which an excluded relay's measurement fits the others' again. The first is a
-/// multiple of the variance, the second a squared relative difference. The larger limit counts.
+/// Limits of the squared difference between an excluded relay's measurement and those of other relays. Up to the limit,
+/// the measurement fits again. The first is a multiple of the variance, the second a squared relative difference. The
+/// larger limit counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays to identify a faulty relay. With four relays only three measurements are left, which always
@@ -105,7 +107,7 @@ pub(crate) struct Trial {
     stage: Stage,
     /// Number of sensing passes (collections of measurements) before the next search is allowed to start.
     cooldown: u8,
-    /// Node without which the variance was smallest so far.
+    /// Node whose omission from the fit has given the smallest variance so far.
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
@@ -262,7 +264,7 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay still does not fit those of the others.
+/// Returns true if an excluded relay's measurement still does not fit those of the remaining relays.
 ///
 /// The measurement v = 1e-12 W / I at `place` is compared with e. e is the value at this place of a source fitted to
 /// `others`, the sums of the remaining relays. The difference is (v / e - e / v) / 2, which is symmetric in both.
@@ -307,8 +309,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than measurement errors can explain. ((ratio - 1 / ratio) /
-/// 2)^2 must then exceed both `deviations` times the variance `unsure`, and `least`.
+/// Returns true if a ratio of powers differs from 1 by more than measurement errors can explain. The value
+/// ((ratio - 1 / ratio) / 2)^2 must then exceed both `deviations` times the ratio's variance `unsure`, and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;

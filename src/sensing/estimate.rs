@@ -107,15 +107,15 @@ const WORTH: f64 = 1e-5;
 /// can mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's mean square change to that by chance, for a stationary source. With a smaller ratio,
-/// the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to the change expected from errors. For a stationary source. With
+/// a smaller ratio, the new estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to that by chance, for a moving source. With a smaller ratio, the
-/// new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to the change expected from errors. For a moving source. With a
+/// smaller ratio, the new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's mean square change to that by chance, which shows a new interferer. This ratio
-/// applies to a stationary source, after [`REFINED`] refinements.
+/// Minimum ratio of an estimate's mean square change to the change expected from errors. A larger ratio shows a new
+/// interferer. For a stationary source, after [`REFINED`] refinements.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -301,7 +301,7 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer at its predicted position for the time when the drones have moved. `None` if the
+/// Returns a moving interferer at its predicted position for the time when the drones are in place. `None` if the
 /// interferer does not move, or if its track deviates too much from the fit. `heard` is the mean time of the
 /// measurements.
 fn followed(

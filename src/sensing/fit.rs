@@ -28,7 +28,8 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error in the estimated variance: a number of measured positions.
+/// Weight of the operator's expected error in the estimate of the error variance. The error counts as if this number of
+/// measured positions had shown it.
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance the

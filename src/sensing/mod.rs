@@ -56,7 +56,7 @@ pub struct Listen {
     pub every: Duration,
     /// Half-life of the weight of earlier measurements; above 0. Use a few seconds for a moving interferer. If it is at
     /// least ten times `every`, the interferer is assumed to be stationary. After five estimates the chain then moves
-    /// again only for a change of more than eight standard deviations.
+    /// again only if the interference changes by more than eight standard deviations.
     pub half_life: Duration,
     /// Relative error of a measurement, 1e-3 to 1: 1 / sqrt(number of independent samples in it).
     pub relative_error: f32,

@@ -30,7 +30,7 @@ pub struct Level {
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// True if the measurements at Tx and Rx contradict each other, and it is unknown which is faulty.
+    /// True if the measurements at Tx and Rx contradict each other. It is unknown which of the two is faulty.
     pub(crate) unknown: bool,
 }
 

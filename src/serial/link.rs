@@ -161,13 +161,13 @@ impl<P, D> SerialLink<P, D> {
 }
 
 pub(super) trait FrameLink {
-    /// Passes up to [`READ_LIMIT`] received bytes to `relay`, as bytes at its `port`.
+    /// Passes up to [`READ_LIMIT`] received bytes to `relay`, as bytes received at the relay's `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
     /// Returns true if one more frame of any length fits into the transmit queue.
     fn has_room(&self) -> bool;
     /// Queues a frame for sending. A frame that does not fit is dropped and counted.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame dropped because this driver does not have its port.
+    /// Counts a frame that is dropped because its port does not exist with this driver.
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);
@@ -274,8 +274,7 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads from the serial port that failed for a reason not counted above.
     pub other: u32,
-    /// Number of failed writes, and of failed queries of the port about bytes that have not left it. Failed writes are
-    /// repeated.
+    /// Number of failed writes, and of failed calls of `has_left`. A failed write is repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each attempt is repeated.
     pub pin: u32,

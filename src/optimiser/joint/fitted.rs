@@ -27,31 +27,36 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions that a pass tries for each relay: the current one, and two on each side of it.
+/// Number of positions that are tried for each relay: the present one, and two on each side of it. They are tried in
+/// every pass over the relays.
 const STATES: usize = 5;
-/// Moves of a relay that a pass tries, in units of the current step width. If two moves are equally good, the one
-/// listed first is used.
+/// Moves of a relay that are tried in each pass over the relays, in units of the current step width. If two moves are
+/// equally good, the one listed first is used.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits that store a choice among the five tried positions of the previous relay.
+/// Number of bits that store one choice among the five tried positions of the next relay toward Tx.
 const BITS: usize = 3;
 
-/// Step width at which the search from one initial chain ends, divided by the distance from Tx to Rx.
+/// Smallest width of a relay's moves, divided by the distance from Tx to Rx. Below it, the search goes on to the next
+/// initial chain.
 const NARROWEST: f32 = 1.0 / 131_072.0;
-/// Relative decrease of the total hop time in a round of passes, below which the step width is halved.
+/// Relative decrease of the total hop time in one round, below which the width of the moves is halved. A round is a
+/// pass over all relays for each coordinate that may change.
 const LITTLE: f32 = 1e-3;
-/// Maximum number of rounds of passes over one initial chain.
+/// Maximum number of rounds from one initial chain. A round is a pass over all relays for each coordinate that may
+/// change: x, y and altitude.
 const ROUNDS: u8 = 200;
 
-/// Number of relays per call in a pass of the solver.
+/// Number of relays that one call of the solver handles in a forward pass, from Tx to Rx.
 const AT_ONCE: u16 = 3;
-/// Number of relays per call in all other work of the solver.
+/// Number of relays that one call of the solver handles in all work except a forward pass.
 const OTHERS_AT_ONCE: u16 = 10;
 
 /// Amount added to each squared hop length, so that no hop time is 0. The unit is the squared distance from Tx to Rx.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: x of relay 1, x of relay N, and first step width. The unit is the distance from Tx to Rx. If the two
-/// x are equal, all relays start there, at their minimum separation.
+/// Initial chains: two ends of an interval of x, and the first step width. The unit is the distance from Tx to Rx. The
+/// relays are evenly spaced between the ends. If the ends are equal, the relays start in a row around this x, at their
+/// minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -62,13 +67,14 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Index, from 0, of the initial chain that equals the best chain along the line Tx to Rx. Used only if relays are
-/// allowed to leave the line or the common altitude.
+/// Index, from 0, of the initial chain that is the best result of all searches along x alone. Used only if the mission
+/// allows several lateral offsets or altitudes.
 const BEST: u8 = 8;
 /// First step width of the moves from initial chain [`BEST`], divided by the distance from Tx to Rx.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of two more initial chains, each as a fraction of its range. The lateral offset ranges
-/// from 0 to its limit on the side without the interferer, the altitude from the common to the highest altitude.
+/// Lateral offset and altitude of further initial chains, as fractions of their ranges. The lateral offset ranges from
+/// 0 to its limit on the side without the interferer. The altitude ranges from the mission's common altitude to the
+/// highest altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Fitted slots of the hops next to a relay: begin and end of each, as fractions of the frame, 0 to 1.
@@ -83,20 +89,21 @@ const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 pub struct SlotShares {
     /// Begin and end of the slot in which this relay sends to the next node toward Rx.
     pub to_rx: [f32; 2],
-    /// Begin and end of the slot in which this relay sends to the next node toward Tx. In a mission of one direction
-    /// both are 1: the slot is empty.
+    /// Begin and end of the slot in which this relay sends to the next node toward Tx. In a mission with data toward Rx
+    /// only, begin and end are 1: the slot is empty.
     pub to_tx: [f32; 2],
     /// Begin and end of the slot in which this relay receives from the next node toward Tx.
     pub from_tx: [f32; 2],
-    /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission of one
-    /// direction both are 1: the slot is empty.
+    /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission with data
+    /// toward Rx only, begin and end are 1: the slot is empty.
     pub from_rx: [f32; 2],
-    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate from Rx to Tx is `reverse`
-    /// times this value.
+    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate from Rx to Tx is r times
+    /// this value, with the mission's required ratio r (`reverse`).
     pub bits_per_hz: f32,
 }
 
-/// Position tried for a node, and the inverse interference there, which is 1 at Tx and Rx.
+/// Position tried for a node, and the inverse interference there. The latter is 1 at Tx and Rx, because the gain of a
+/// hop to Tx or Rx includes it.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -120,8 +127,9 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains, r, and the minimum separation. r is the data rate to Tx divided by the data rate
-/// to Rx. `gains` has the gain toward Rx and the gain toward Tx, each divided by the SNR gap.
+/// Hop between two nodes: its gains, its ratio r of data rates, and the separation of its ends. The ratio r is the data
+/// rate to Tx divided by the data rate to Rx. `gains` has the gain toward Rx and the gain toward Tx, each divided by
+/// the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
@@ -185,22 +193,24 @@ pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. At the end of the search, each relay's x and y are replaced by sums of hop times
-    /// over the hops from Tx to the relay: x by the times toward Rx, y by the times toward Tx.
+    /// Positions of the best chain. At the end of the search, each relay's x and y are replaced by total hop times from
+    /// Tx to the relay: x by the total time toward Rx, and y by the total time toward Tx.
     best_places: [Triple; RELAYS],
-    /// Best position of the previous relay for each of a relay's five tried positions: three bits each.
+    /// Choices for each relay: the best position of the next relay toward Tx for each of five positions. A choice is an
+    /// index in [`MOVES`], and takes three bits.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
     /// Number of the current initial chain, from 0.
     number: u8,
     rounds: u8,
-    /// Coordinate that the current pass changes: 0 for x, 1 for y, 2 for the altitude.
+    /// Coordinate that the current pass over the relays changes: 0 for x, 1 for y, 2 for the altitude.
     axis: u8,
     width: f32,
     /// Total hop time of the current chain, which is to be minimised. Infinite if relays are too close.
     time: f32,
-    /// Total hop time of the current chain at the start of this round of passes.
+    /// Total hop time of the current chain at the start of this round. A round is a pass over all relays for each
+    /// coordinate that may change.
     before: f32,
     /// Total hop time of the best chain found; 0 until a chain is found.
     best: f32,
@@ -229,7 +239,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         worst: 0.0,
     };
 
-    /// Continues the solution by one bounded portion. `Ready` once the chain is solved, with the linear SIR of the
+    /// Continues the solution by a bounded amount of work. `Ready` once the chain is solved, with the linear SIR of the
     /// worst hop.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let relays = chain.relays();
@@ -320,8 +330,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns the position of node `index`, moved by `by` along the current coordinate within its limits. Index 0 is
-    /// Tx, and N + 1 is Rx.
+    /// Returns the position of node `index`, moved by `by` along the current coordinate. The result stays within the
+    /// limits of this coordinate. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
@@ -389,8 +399,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         self.work = Work::Pass(end);
     }
 
-    /// Continues after a pass whose best combination of moves has the total hop time `time`. `state` is the index of
-    /// the last relay's move in [`MOVES`].
+    /// Continues after a forward pass, which has found the best combination of all relays' moves. `time` is the total
+    /// hop time with these moves. `state` is the index of the last relay's move in [`MOVES`].
     fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
@@ -453,8 +463,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns the times of the hop to node `index` toward Rx and toward Tx. Lowers `worst` to the hop's lower SIR if
-    /// that is smaller.
+    /// Returns the time of the hop to node `index` toward Rx, and its time toward Tx. Updates `worst`, the lowest SIR
+    /// of all hops so far.
     fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
@@ -471,7 +481,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 
     /// Returns the end of hop `hop`'s slot toward Rx, and the begin of its slot toward Tx. Both are fractions of the
-    /// frame. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
+    /// frame. `hop` is at most N + 1. For `hop` 0, the result is the begin and the end of the frame: 0 and 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {

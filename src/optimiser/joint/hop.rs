@@ -42,7 +42,7 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end of a hop that just meets its target SIR.
+/// Derivatives of a hop's end position, for a hop that just meets its target SIR.
 ///
 /// Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w, of the hop's start
 /// p, and of the target SIR.
@@ -68,7 +68,8 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Derivatives of a hop whose end is fixed: all are 0. The end is fixed at the x of Rx or at the hop's farthest x.
+    /// Derivatives of a hop whose end is fixed: all are 0. Used if the end is at the x of Rx, or if its dependent
+    /// coordinate has no finite derivatives.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -215,9 +216,9 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s is the squared distance from the hop's receiver
-/// to the interferer, m^2, and l the squared length of the hop, m^2. `c` is the target divided by the gain; noise makes
-/// it larger.
+/// Condition s + `spare` >= `c` l for a hop to meet its target SIR. The squared distance from the hop's receiver to the
+/// interferer is s, m^2, and the squared hop length is l, m^2. `c` is the target divided by the gain. Noise makes `c`
+/// larger, and the constant `spare` larger than 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,

@@ -15,10 +15,11 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use core::task::Poll;
 
-/// Number of relays per call: with data in one direction, and in both.
+/// Number of relays per call: for data in one direction, and for data in both directions.
 const AT_ONCE: [u16; 2] = [20, 2];
 
-/// Memory of a relay during Algorithm 1: its x, and the upper limit of its x, m.
+/// Memory of a relay during Algorithm 1, the computation of all x for one target. It has the relay's x, and the upper
+/// limit of this x, m.
 pub(super) trait Noted {
     fn lengths_m(&mut self) -> &mut [f32; 2];
 }
@@ -29,19 +30,22 @@ impl Noted for [f32; 2] {
     }
 }
 
-/// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
+/// Progress of Algorithm 1 for one target SIR: a pass over the relays to Rx, then a pass back to Tx. Algorithm 1
+/// computes the x of all relays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Index of the relay that the pass has computed last. 0 before the pass to Rx, and at the end of the pass back.
+    /// Index of the relay that was computed last in the current pass over the chain. 0 before the pass to Rx, and at
+    /// the end of the pass back to Tx.
     index: u16,
     /// True during the pass along the chain from Rx back to Tx.
     is_back: bool,
-    /// True if some relay has to stay closer to Tx than its farthest x, or if data flow in both directions.
+    /// True if data flow in both directions, or if some relay has to stay closer to Tx than its farthest x. The
+    /// farthest x is the largest x at which the hop to the relay meets the target.
     holds_back: bool,
     /// x of relay `index`, m. In the pass to Rx it is the farthest x that meets the target; in the pass back it is
     /// the final x.
     x_m: f32,
-    /// Upper limit of the x of relay `index`, m. Up to this x, the relays toward Rx fit with their separation.
+    /// Upper limit of the x of relay `index`, m. It leaves the relays toward Rx space for their separation.
     end_m: f32,
 }
 
@@ -55,7 +59,8 @@ impl Line {
     };
 
     /// Continues Algorithm 1 by some relays, for the target `sigma`, in ln(SIR). `Ready` with `None` if the target
-    /// cannot be met, with true if some relay has to stay closer to Tx than its farthest x, else with false.
+    /// cannot be met. Otherwise `Ready` with true if data flow in both directions, or if some relay has to stay closer
+    /// to Tx than the largest x at which its hop meets the target.
     ///
     /// `cells` has the relays' lateral offsets and altitudes; their x are written to `notes`. `closed` has the minimum
     /// distance along x of relay 1 from Rx and of the last relay from Tx, as fractions of the distance from Tx to Rx.
@@ -150,8 +155,8 @@ impl Line {
     }
 }
 
-/// Returns the hop to relay `index`, computed exactly as the relay computes it. The x of the hop's end is at most
-/// `end_m`, m.
+/// Returns the hop to relay `index`, computed exactly as this relay computes it in flight. The x of the hop's end is at
+/// most `end_m`, m.
 fn hop<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,
@@ -177,8 +182,9 @@ fn hop<const RELAYS: usize>(
     .ending(end_m)
 }
 
-/// Returns the chain's slack, m, and the final x of the last relay, m. `[from_m, reach_m]` are the farthest x of the
-/// last two relays, m, and `end_m` is the upper limit of the last relay's x.
+/// Returns the chain's slack, m, and the final x of the last relay, m. The slack is the length by which the chain
+/// overshoots Rx. `[from_m, reach_m]` are the farthest x of the last two relays, m, and `end_m` is the upper limit of
+/// the last relay's x.
 fn ending<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,
@@ -228,7 +234,7 @@ impl<const RELAYS: usize> Cells<RELAYS> {
         chain.mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index`, m, at which the relays toward Rx fit with their separation.
+    /// Returns the largest x of relay `index`, m. It leaves the relays toward Rx space for their separation.
     pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
         let first = chain.distance_m() - steps.clone().sum::<f32>();

@@ -32,5 +32,6 @@ pub use chain::Seat;
 pub use site::Room;
 pub use solver::Solver;
 
-/// Maximum number of relays for which the joint method works; 0 without the feature `altitude`.
+/// Maximum number of relays for the joint method, which optimises x, y and altitude together. 0 without the feature
+/// `altitude`.
 pub const MOST_SOLVED: usize = if ALTITUDE { 100 } else { 0 };

@@ -12,20 +12,21 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. The function assumes
-/// that the relays toward Rx react optimally.
+/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. The slack is the
+/// length by which the chain overshoots Rx. The relays toward Rx are assumed to react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// First derivatives of the slack with respect to the relay's x, y and h, m per m.
+    /// First derivatives of the chain's slack with respect to the relay's x, y and h, m per m. The slack is the length
+    /// by which the chain overshoots Rx.
     pub(crate) slope: Triple,
-    /// Second derivatives of the slack with respect to the relay's x, y and h, 1/m; symmetric.
+    /// Second derivatives of the chain's slack with respect to the relay's x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// Derivative of the slack with respect to the target ln(SIR), m.
+    /// Derivative of the slack, by which the chain overshoots Rx, with respect to ln(target SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of a f + b f^2, the increase of the slack by the relays' moves, m. This relay and all relays
-    /// toward Rx make the fraction f, 0 to 1, of their computed moves.
+    /// Coefficient a of the predicted increase of the chain's slack, a f + b f^2, m. The fraction f, 0 to 1, is the
+    /// part of their computed moves that this relay and all relays toward Rx make.
     pub(crate) linear: f32,
-    /// Coefficient b of a f + b f^2, the increase of the slack by the relays' moves, m; see `linear`.
+    /// Coefficient b of the predicted increase of the chain's slack, a f + b f^2, m; see `linear`.
     pub(crate) square: f32,
 }
 
@@ -72,7 +73,7 @@ impl Outlook {
         }
     }
 
-    /// Replaces the value function of a hop's receiver by the sender's, and returns the receiver's policy. The policy
+    /// Replaces a hop receiver's value function by that of the hop's sender; returns the receiver's policy. The policy
     /// is a move in two coordinates from the present position, within [`low`, `high`], m. The third coordinate, `axis`,
     /// follows from the hop's maximum length.
     pub(super) fn pass(

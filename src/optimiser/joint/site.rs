@@ -16,7 +16,8 @@ use crate::sir::{Sender, in_noise, square};
 /// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation in the joint method. Rounding then cannot violate the true separation.
+/// Factor on the minimum separation in the joint method. It is a margin, so that rounding errors do not bring relays
+/// closer than the mission's separation.
 pub(super) const MARGIN: f32 = 1.0005;
 
 /// Number of Newton steps in the computation of a hop with noise. Each step linearises the hop's condition at the
@@ -292,9 +293,9 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point at which the line from `best` to `wanted` leaves a circle. `None` if `best` is outside of the
-/// circle. The points are lateral offsets and altitudes. `middle` is the circle's centre, and `rim` its squared radius,
-/// m^2.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. `None` if its start `best` is outside
+/// of the circle. All points are lateral offsets and altitudes. `middle` is the circle's centre, and `rim` its squared
+/// radius, m^2.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -318,7 +319,8 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay. Three bytes for each hold a fraction of the allowed range.
+/// Stored lateral offset and altitude of one relay. Each of the two takes three bytes, and is a fraction of its allowed
+/// range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
@@ -487,8 +489,8 @@ const STIFFNESS: f32 = 100.0;
 /// distance from Tx to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference of a hop's squared length from its maximum, up to which it counts as maximum. Used for hops that
-/// end at the x of Rx. A shorter hop does not restrict the move of its receiver.
+/// Relative margin of a hop to its target, up to which the hop counts as one of maximum length. Used for hops that end
+/// at the x of Rx. A hop with a larger margin does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
@@ -516,8 +518,8 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if it is far enough away. The chain's
-    /// slack is reduced by the penalty.
+    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if it is far enough away. The penalty is
+    /// subtracted from the chain's slack, the length by which the chain overshoots Rx.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)

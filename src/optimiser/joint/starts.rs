@@ -24,8 +24,8 @@ pub(super) enum Start {
     /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
     /// Initial chain on a parabola as for `Arch`, but without a minimum separation. The solver then searches the
-    /// highest target of this chain. The solver computes the hops exactly as the relays do in flight, and a relay is
-    /// allowed to stay closer to Tx than its farthest x.
+    /// highest target of this chain, with the hops computed exactly as in flight. A relay is allowed to stay closer to
+    /// Tx than the largest x at which its hop meets the target.
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
@@ -36,11 +36,11 @@ pub(super) enum Start {
     FixedAltitudes { aside: f32, level: bool },
     /// Initial chain in a zigzag, for relays that do not fit between Tx and Rx in one line.
     ///
-    /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position one
-    /// separation beside it. The corner is at the highest altitude, on the side of the line Tx to Rx opposite the
+    /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position beside it,
+    /// at the minimum separation. The corner is at the highest altitude, on the side of the line Tx to Rx opposite the
     /// interferer.
     Turns,
-    /// Initial chain at the lowest altitude, for a target with which no chain gets past the interferer.
+    /// Initial chain at the lowest altitude, for a target at which no chain gets past the interferer.
     Near,
     /// Initial chain with relay 1 at the x of Rx, high above Rx or beside Rx at the largest lateral offset. The lateral
     /// offsets and altitudes of the other relays lead from there in equal steps to the line Tx-Rx and the lowest
@@ -59,7 +59,7 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of entries of [`ARCHES`], from the first, that are also tried without a minimum separation.
+/// Number of entries, counted from the start of [`ARCHES`], that are also tried without a separation.
 const THROUGH: usize = 3;
 
 /// Initial chains for missions with fixed altitudes; the fields are those of [`Start::FixedAltitudes`].
@@ -264,7 +264,7 @@ impl Start {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
     /// Highest target found feasible, in ln(SIR); `None` until a target is found. The `bool` is true if some relays
-    /// have to stay closer to Tx than their farthest x to meet this target.
+    /// must stay closer to Tx than the largest x at which their hops meet this target.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -288,8 +288,8 @@ impl Seek {
     }
 
     /// Creates a search upward from the feasible target `sigma`, in ln(SIR), to the precision `width`. The first step
-    /// is `step`; each further step is three times the previous one. `holds_back` is true if some relays have to stay
-    /// closer to Tx than their farthest x to meet `sigma`.
+    /// is `step`; each further step is three times the previous one. `holds_back` is true if some relays must stay
+    /// closer to Tx than the largest x at which their hops meet `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -303,8 +303,8 @@ impl Seek {
 
     /// Records if the chain meets the target that was tried. Returns true if there is a further target to try.
     ///
-    /// `met` is `None` if the target is infeasible. Otherwise `met` is true if some relays have to stay closer to Tx
-    /// than their farthest x to meet the target.
+    /// `met` is `None` if the target is infeasible. Otherwise `met` is true if some relays must stay closer to Tx than
+    /// the largest x at which their hops meet the target.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -331,7 +331,7 @@ impl Seek {
     }
 
     /// Returns the highest feasible target found, in ln(SIR); `None` if no target is feasible. The `bool` is true if
-    /// some relays have to stay closer to Tx than their farthest x to meet this target.
+    /// some relays must stay closer to Tx than the largest x at which their hops meet this target.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }

@@ -25,10 +25,10 @@ use super::super::hop::{Triple, minus};
 /// to Rx.
 const SHORTEST: f32 = 1e-8;
 
-/// Levels of a hop: ln(SIR toward Rx) and ln(SIR toward Tx / r).
+/// Levels of a hop: ln F and ln(B / r), with the SIR F toward Rx and the SIR B toward Tx.
 ///
-/// r is the required ratio of the SIR toward Tx to the SIR toward Rx. All pairs of values for a hop have the order
-/// toward Rx, toward Tx. The *slack* of a level is the level minus the target.
+/// The mission requires the ratio r of B to F. All pairs of values for a hop have the order toward Rx, toward Tx. The
+/// *slack* of a level is the level minus the target.
 pub(super) type Levels = [f32; 2];
 
 /// Symmetric 3 x 3 matrix with rows and columns x, y and altitude h. The elements are xx, xy, xh, yy, yh, hh.

@@ -52,7 +52,7 @@ const LAST_MU: f32 = 1e-4;
 const LESS: f32 = 0.3;
 
 /// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. This limit applies
-/// after more than half of a Newton step. The merit is the maximised function.
+/// if the relays made more than half of the computed Newton step. The merit is the maximised function.
 const SETTLED: f32 = 0.1;
 /// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. This limit applies
 /// after a Newton step of any length. The merit is the maximised function.
@@ -69,16 +69,17 @@ const TRIES: u8 = 6;
 /// Maximum factor between a Lagrange multiplier and its value at the optimum. Multipliers are limited to this range.
 const APART: f32 = 5.0;
 
-/// Number of Newton steps for the target that one call makes.
+/// Number of Newton iterations per call in the computation of the target T, in ln(SIR).
 const STEPS: u8 = 4;
-/// Index, from 0, of the last Newton step for the target.
+/// Index, from 0, of the last Newton iteration in the computation of the target T, in ln(SIR).
 const TARGETS: u8 = 12;
-/// Relative error at which the Newton iteration for the target T ends.
+/// Relative error of the equation for the target T, at which the Newton iteration for T ends. The equation is: the sum
+/// of mu / (c - T) over all levels c is 1, with the barrier weight mu.
 const EXACT: f32 = 5e-4;
 
 /// Number of relays in a segment, the part of the chain that one call handles.
 const AT_ONCE: u16 = 10;
-/// Number of relays in the first of a segment's two parts.
+/// Number of relays in the first part of a segment. A segment has ten relays; the second part has [`SECOND`] of them.
 const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
@@ -105,7 +106,7 @@ pub(super) struct Node {
     hop: Hop,
 }
 
-/// Algorithm 1 uses the memory of the levels, which the interior-point method computes later.
+/// Algorithm 1, the computation of all x for one target, uses the memory that later holds the levels.
 impl Noted for Node {
     fn lengths_m(&mut self) -> &mut [f32; 2] {
         &mut self.hop.level
@@ -117,9 +118,9 @@ type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
 enum Segment {
-    /// Equations of the segment's first relay, after all earlier relays are eliminated.
+    /// Equations of the first relay of a segment (ten relays), after all earlier relays are eliminated.
     Front(Front),
-    /// Newton steps of the segment's relays: of its first six and of its last four.
+    /// Newton steps of the relays of a segment: of its first six relays, and of its last four relays.
     Steps([Step; FIRST], [Step; SECOND]),
 }
 
@@ -165,7 +166,8 @@ impl Spot {
 enum Work {
     /// Computation of all hops' [levels](Levels) at the tried positions. The field is the next hop.
     Levels(u16),
-    /// Computation of the target from all levels; the field is the number of Newton steps done for it.
+    /// Computation of the target T from the levels of all hops. T is slightly below all levels. The field is the number
+    /// of Newton iterations done for T.
     Target(u8),
     /// Summation of the merit, which decides if a step is accepted. The field is the next hop.
     Merit(u16),
@@ -178,7 +180,8 @@ enum Work {
     Substitute(u16, bool),
 }
 
-/// Interior-point method for the worst SIR of all hops toward Rx and Tx: positions and Newton step.
+/// Interior-point method that maximises the worst SIR of all hops, in both directions of data. It stores the relays'
+/// positions and Newton steps.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
@@ -190,7 +193,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Newton steps of the current segment's second part, kept until its first part is computed.
+    /// Newton steps of the last four relays of the current segment, kept until the first six are computed.
     second: [Step; SECOND],
     /// Newton step of the next relay toward Rx. The current relay's step is computed from it.
     ahead: Triple,
@@ -281,7 +284,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the x, m, that Algorithm 1 has stored for relay `index`.
+    /// Returns the x of relay `index`, m, that Algorithm 1 has stored. This algorithm computes the x of all relays for
+    /// one target.
     pub(super) fn noted_x_m(&self, index: u16) -> f32 {
         let node = self.nodes.get(usize::from(index).wrapping_sub(1));
         node.map_or(0.0, |node| node.hop.level[0])
@@ -338,8 +342,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the stored levels and Lagrange multipliers of hop `k`. Hop `k` leads to relay `k`, or to Rx if `k` is N
-    /// + 1.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`. Hop `k` leads to relay `k`, or to Rx for
+    /// `k` = N + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -362,8 +366,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues the interior-point method by one bounded portion. `Ready` at the end, with a target in ln(SIR). The
-    /// target is slightly below all [levels](Levels) of the hops at the stored positions.
+    /// Continues the interior-point method by a bounded amount of work. `Ready` at the end, with a target in ln(SIR).
+    /// The target is slightly below all [levels](Levels) of the hops at the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -443,7 +447,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes the target T for the stored levels c, in ln(SIR). The sum of mu / (c - T) over all levels is 1.
+    /// Computes the target T, in ln(SIR), for the stored levels c. With the barrier weight mu, the sum of mu / (c - T)
+    /// over all levels is 1.
     ///
     /// The inverse of this sum is concave in T, and Newton's method starts above the solution. So every iteration
     /// lowers T toward the solution.
@@ -480,8 +485,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Accepts the tried step if it does not lower the merit; otherwise shortens the step. If the shortest step also
-    /// lowers the merit, a new step is computed without negative curvature. If that one fails too, the barrier weight
-    /// falls.
+    /// lowers the merit, a new step is computed without negative curvature. If the shortest part of the new step lowers
+    /// the merit too, the barrier weight falls.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -561,7 +566,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Returns the derivatives of hop `k`'s [levels](Levels) with respect to the positions `ends`. Also returns the
-    /// hop's Lagrange multipliers and slacks.
+    /// hop's Lagrange multipliers and slacks (level minus target).
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
@@ -603,8 +608,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(front)
     }
 
-    /// Eliminates all relays of `segment`, then begins the next segment or the computation of steps. `None` if the
-    /// Newton system cannot be solved.
+    /// Eliminates all relays of `segment`, which has ten relays, from the Newton system. Then begins the next segment
+    /// or the computation of steps. `None` if the Newton system cannot be solved.
     fn forward(&mut self, chain: &Chain<'_, impl SeatOf>, segment: u16) -> Option<()> {
         let relays = chain.relays();
         if segment == 0 {
@@ -626,8 +631,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Computes the Newton steps of one part of `segment`, from its last relay to its first. `None` if the system
-    /// cannot be solved or a step is not finite.
+    /// Computes the Newton steps of the first six or the last four relays of `segment`. It starts with the relay
+    /// nearest to Rx. `None` if the system cannot be solved or a step is not finite.
     fn substitute(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -704,7 +709,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns the number of levels, two for each hop.
+/// Returns the number of [levels](Levels) in a chain: one for each hop and direction of data.
 fn levels(chain: &Chain<'_, impl SeatOf>) -> f32 {
     2.0 * f32::from(chain.relays() + 1)
 }

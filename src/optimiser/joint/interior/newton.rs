@@ -26,7 +26,7 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest positive pivot, divided by the value of that diagonal element before the elimination.
+/// Smallest pivot that counts as positive, divided by the diagonal element before the elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
 /// Curvature of a coordinate whose two limits are equal. The curvature is so large that the Newton step does not move
@@ -59,7 +59,7 @@ pub(super) struct Factor {
     rows: [Row; 3],
 }
 
-/// Sums over all hops and relays, for the Newton step of the target.
+/// Sums over all hops and relays, for the Newton step of the target T, in ln(SIR).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,
@@ -67,7 +67,7 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Lagrange multipliers of a hop's levels, the slacks of the levels, and the barrier weight `mu`.
+/// Lagrange multipliers of a hop's two levels, their slacks (level minus target), and barrier weight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -76,19 +76,20 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier divided by the slack, for each direction of data on the hop.
+    /// Returns the Lagrange multiplier divided by the slack (level minus target) for each data direction.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the Lagrange multipliers at the optimum: mu / slack for each direction of data on the hop. mu is the
-    /// barrier weight.
+    /// Returns the Lagrange multipliers at the optimum: mu / slack for each direction of data on the hop. The slack is
+    /// the level minus the target, and mu is the barrier weight.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the hop's Lagrange multipliers after a Newton step that changes the two slacks by a and b.
+    /// Returns the hop's Lagrange multipliers after a Newton step. The step changes the hop's two slacks (level minus
+    /// target) by a and b.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -285,7 +286,8 @@ impl Sums {
         column: 0.0,
     };
 
-    /// Returns the Newton step of the target. `None` if the system has no maximum, so that there is no step.
+    /// Returns the Newton step of the target T, in ln(SIR). `None` if the system has no maximum, so that there is no
+    /// step.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;
         (rest > 0.0).then(|| self.slope / rest)

@@ -45,13 +45,13 @@ struct Start {
 /// Way to choose the initial x of the relays along the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Along {
-    /// Use of Algorithm 1 for the x, with the relays' lateral offsets and altitudes.
+    /// Best x for the lateral offsets and altitudes of the relays, computed by Algorithm 1.
     Line,
     /// Spacing in equal steps, from the first to the last relay. The fields are the distances of these two relays from
     /// the end (Tx or Rx) with more power. They are fractions of the distance from Tx to Rx.
     Even([f32; 2]),
-    /// Use of Algorithm 1 for the x, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow
-    /// part of an ellipse down to the end (Tx or Rx) with less power.
+    /// Best x as for `Line`, but without the x that `close_beyond` excludes. Lateral offsets and altitudes fall along a
+    /// part of an ellipse to the end (Tx or Rx) with less power.
     Arc,
 }
 
@@ -101,9 +101,10 @@ impl Start {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Search for the highest target that an initial chain meets.
+    /// Search for the highest target SIR of an initial chain, before its relays are moved.
     Start,
-    /// Search for the highest target at the interior-point method's lateral offsets and altitudes.
+    /// Search for the highest target SIR after a run of the interior-point method. The lateral offsets and altitudes
+    /// are the result of this run.
     Result,
     /// Finer search for the best chain's highest target, at the end of the whole solution.
     Last,
@@ -116,7 +117,8 @@ enum Work {
     Begin(u16),
     /// Search for the highest target that Algorithm 1 meets at the current lateral offsets and altitudes.
     Seek(Seek, Purpose),
-    /// Computation of the x of all relays by Algorithm 1 for this target, in ln(SIR).
+    /// Computation of the x of all relays by Algorithm 1. The field is the target that the hops have to meet, in
+    /// ln(SIR).
     Settle(f32),
     /// Choice of the positions at which the interior-point method starts. The field is the number of relays done.
     Put(u16),
@@ -255,8 +257,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. At these x the
-    /// SIR of this relay rises with its distance from that end.
+    /// Excludes a range of x for the relay next to the end (Tx or Rx) with more power. In this range, beyond the
+    /// interferer as seen from that end, the relay's SIR rises with its distance from the end.
     ///
     /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
     /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
@@ -288,8 +290,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Stores the current chain if its target `sigma`, in ln(SIR), is the best so far. Returns the next work: a run of
-    /// the interior-point method if Algorithm 1 has found positions worth an improvement, otherwise the next initial
-    /// chain.
+    /// the interior-point method from this chain, or the next initial chain. A repeated run requires that Algorithm 1
+    /// has found a higher target than the run before.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);

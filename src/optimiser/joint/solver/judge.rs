@@ -13,16 +13,17 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision in ln(SIR) of the search for the highest target that an improved chain meets.
+/// Precision, in ln(SIR), of the search for a chain's highest target after moves of its relays.
 pub(super) const JUDGED: f32 = 4e-6;
 
 /// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). The search for
 /// better chains ends if a chain reaches the bound within this tolerance.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Difference in ln(SIR) of the first limit on the target and the upper bound of all chains.
+/// First limit on the target of a chain's improvement, minus the SIR's upper bound, in ln(SIR). The upper bound holds
+/// for all chains.
 ///
-/// The search then checks if the chain reaches the bound; if so, the search ends.
+/// At this limit the search checks if the chain reaches the upper bound; if so, the search ends.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -47,8 +48,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Records if the chain meets the tried target, and selects the next piece of work.
     ///
-    /// `met` is `None` if the target is infeasible; otherwise it is true if some relays have to stay closer to Tx than
-    /// their farthest x.
+    /// `met` is `None` if the target is infeasible. Otherwise it is true if some relays must stay closer to Tx than
+    /// their farthest x, the largest x at which the hop to the relay meets the target.
     pub(super) fn tried(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -155,11 +156,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target of the current chain, after its improvement.
+    /// Returns the work that searches for the current chain's highest target, once its relays were moved.
     ///
-    /// Hops are computed exactly as the relays compute them from their messages. Relays are allowed to stay closer to
-    /// Tx than their farthest x. The improvement ended at the target `sigma`, and `ceiling` is the upper bound of all
-    /// chains, both in ln(SIR).
+    /// Hops are computed exactly as the relays compute them from their messages. A relay is allowed to stay closer to
+    /// Tx than the largest x at which its hop meets the target. `sigma` is the target at which the moves of the relays
+    /// ended, and `ceiling` the upper bound of all chains, both in ln(SIR).
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -170,14 +171,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the current chain can still become the best chain. Such a chain is improved again.
+    /// Returns true if the current chain can still become the best chain. Its relays are then moved again.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current chain can no longer become the best chain. Its improvement then stops. `turn` is the
-    /// next action of the improvement.
+    /// Returns true if the current chain can no longer become the best chain. The moves of its relays then end. `turn`
+    /// is the next action in the computation of these moves.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -212,13 +213,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays for which single relays are moved in the last phase. In a chain with fixed altitudes of
-/// some relays there is no maximum: single relays are always moved.
+/// Maximum number of relays in a chain whose relays are moved singly. Single relays are moved after the search over the
+/// initial chains. In a chain with fixed altitudes of some relays there is no maximum.
 const POLISHED: u16 = 5;
 
-/// Number of times that the trial moves of single relays are halved in the last phase.
+/// Number of times that the trial moves of single relays are halved. Single relays are moved after the search over the
+/// initial chains.
 const HALVINGS: u16 = 12;
-/// First trial move of a relay in the last phase, as a fraction of its allowed range.
+/// First trial move of a single relay, as a fraction of its allowed range. Single relays are moved after the search
+/// over the initial chains.
 const FIRST_MOVE: f32 = 0.25;
 
 /// Minimum gain of the target for which a trial move of a relay is accepted, in ln(SIR).
@@ -286,7 +289,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Begins the improvement of the next initial chain, or ends the search after the last one.
+    /// Begins the moves of the relays of the next initial chain. Ends the search after the last initial chain.
     pub(super) fn begin(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,

@@ -36,7 +36,7 @@ use both::Both;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {
-    /// Number of relays that the forward pass has moved.
+    /// Number of relays that the forward pass, from Tx to Rx, has moved.
     done: u16,
     /// Position of the last moved relay after its move.
     from: Placement,
@@ -74,17 +74,18 @@ enum Work {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Search for the highest target that an initial chain meets.
+    /// Search for the highest target SIR of an initial chain, before its relays are moved.
     Start,
     /// Search for the highest target that the current chain meets without moves of its relays.
     Raise,
-    /// Computation of the chain's slack after the upper limit on the slack was lowered.
+    /// Computation of the chain's slack under a lowered upper limit on it. Slack above the limit does not count.
     Tighten,
-    /// Search for the highest target of an improved chain, with the hops computed as in the improvement.
+    /// Search for the highest target of a chain once its relays were moved. Hops are computed as for these moves, not
+    /// exactly as in flight.
     Judge,
-    /// Search for the highest target of an improved chain, with the hops computed exactly as in flight.
+    /// Search for the highest target of a chain once its relays were moved. Hops are computed exactly as in flight.
     Last,
-    /// Check if the chain meets the upper bound of all chains, with the hops computed exactly as in flight.
+    /// Check if the chain reaches the SIR's upper bound of all chains. Hops are computed exactly as in flight.
     Probe,
     /// Check of a trial move of one relay, with the hops computed exactly as in flight.
     Move,
@@ -93,7 +94,7 @@ enum Purpose {
 impl Purpose {
     /// Returns true if hops are computed exactly as the relays compute them in flight, from messages.
     ///
-    /// A relay is then allowed to stay closer to Tx than its farthest x.
+    /// A relay is then allowed to stay closer to Tx than the largest x at which the hop to it meets the target.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -110,11 +111,12 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Highest target that the improvement of any chain has reached, ln(SIR). A chain that is predicted to end below it
-    /// is dropped.
+    /// Highest target that any chain has reached by moves of its relays, in ln(SIR). A chain that is predicted to end
+    /// below it is dropped.
     highest: f32,
     best_cells: Cells<RELAYS>,
-    /// Target at which the improvement of the best chain ended, in ln(SIR). The last search starts there.
+    /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for this chain's highest
+    /// target starts there.
     best_judged: Option<f32>,
     /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, or if it
     /// was stopped early.
@@ -129,17 +131,19 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     line: Line,
     /// x of each relay, and the upper limit of this x, m. Used only while hops are computed exactly as in flight.
     notes: [[f32; 2]; RELAYS],
-    /// True if some relays have to stay closer to Tx than their farthest x to meet the target found.
+    /// True if some relays have to stay closer to Tx than their farthest x to meet the target found. The farthest x is
+    /// the largest x at which the hop to the relay meets the target.
     holds_back: bool,
     /// True if the minimum separation of relays has restricted the improvement of any chain.
     walled: bool,
-    /// Number of the next trial move of a single relay in the last phase; see [`OneWay::move_of`].
+    /// Number of the next trial move of a single relay; see [`OneWay::move_of`]. Single relays are moved after the
+    /// search over the initial chains.
     moving: u16,
-    /// Number of accepted trial moves in the last phase.
+    /// Number of accepted trial moves of single relays, after the search over the initial chains.
     moved: u8,
     /// Lateral offset and altitude of a relay before its current trial move.
     kept: Cell,
-    /// Number of the segment whose computed moves are in memory; `None` if there is none.
+    /// Number of the segment (ten relays) whose computed moves are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
@@ -224,7 +228,7 @@ const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 /// needs.
 const FITTED: usize = ALTITUDE as usize;
 
-/// Joint solver of a chain: the solver for data in one direction, in both, or for fitted slots.
+/// Joint solver of a chain: for data in one direction or in both directions, or for fitted slots.
 ///
 /// A mission needs only one of the three, so they share their memory.
 #[cfg_attr(
@@ -242,7 +246,7 @@ enum Way<const RELAYS: usize, const SEGMENTS: usize> {
     Fitted([Fitted<RELAYS>; FITTED]),
 }
 
-/// Joint solver of a chain of at most `RELAYS` relays, for one direction or both.
+/// Joint solver of a chain of at most `RELAYS` relays, for data in one direction or in both directions.
 ///
 /// `SEGMENTS` is at least a tenth of `RELAYS`, since a segment has ten relays.
 #[derive(Clone, Debug)]
@@ -287,7 +291,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         cell.unwrap_or_default().place(seat.room)
     }
 
-    /// Returns the largest x of relay `index`, m, at which the relays toward Rx fit with their separation.
+    /// Returns the largest x of relay `index`, m. It leaves the relays toward Rx space for their separation.
     ///
     /// The chain must be solved. The limit is equal, to the bit, to the limit that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
@@ -296,7 +300,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solved.map_or(0.0, |(chain, cells)| cells.end_m(&chain, index))
     }
 
-    /// Returns true if, for the target found, some relays have to stay closer to Tx than their farthest x.
+    /// Returns true if some relays have to stay closer to Tx than their farthest x, for the target found. The farthest
+    /// x is the largest x at which the hop to the relay meets the target.
     pub const fn holds_back(&self) -> bool {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,

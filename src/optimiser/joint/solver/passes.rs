@@ -24,7 +24,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Computes the policies (moves) of the relays in `segment`. Returns the value function of the last relay before
     /// the segment; `before` is the position of that relay.
     ///
-    /// `None` if a hop cannot meet the target. Bounded by ten relays.
+    /// `None` if a hop cannot meet the target. Work: at most ten relays.
     pub(super) fn recall(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -183,17 +183,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays per call in a pass that computes only their x.
+/// Number of relays per call in a pass that computes only x, not lateral offsets and altitudes.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty for relays too near the interferer at which an improved chain counts as feasible. The unit is the
-/// distance from Tx to Rx.
+/// Maximum penalty up to which a chain counts as feasible after moves of its relays. The penalty is for relays too near
+/// the interferer. The unit is the distance from Tx to Rx.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and
-    /// altitudes stay unchanged. Stores the chain if `kept` is true. At the end of the pass returns the chain's slack,
-    /// m, or `None` if a hop cannot meet the target.
+    /// altitudes stay unchanged. Stores the chain if `kept` is true. At the end of the pass returns the chain's slack
+    /// (the length by which it overshoots Rx), m, or `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
