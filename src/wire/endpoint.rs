@@ -41,8 +41,8 @@ impl Endpoint {
     }
 
     /// Signs all frames from now on with the key and epoch in `auth`. This node's nonces count up from `claim`, a
-    /// random number drawn at start. Once a node has been silent for `gone_after`, a second node with the same number
-    /// can take its session.
+    /// random number drawn at start. Once a remote node has been silent for `gone_after`, a second node with the same
+    /// number can replace it.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
@@ -89,8 +89,8 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once a signing node has used all frame counters. The node must not send before it restarts with a
-    /// new epoch, because a counter must not be used twice.
+    /// Returns true once a signing node has used all values of its frame counter. The node must then restart with a new
+    /// epoch before it sends again, because a value must not be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }

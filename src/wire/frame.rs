@@ -27,14 +27,14 @@ const SIGNED: u16 = 0x1000;
 /// Header flag: the body is an authentication handshake. A handshake is valid only with a tag.
 const HANDSHAKE: u16 = 0x2000;
 
-/// Buffer for one encoded frame, of the maximum length.
+/// Buffer for one encoded frame; its size is the maximum length of a frame.
 pub type FrameBuf = [u8; MAX_FRAME];
 
 /// Header of a frame: numbers of the network, the sender, the destination and the frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Number of the network, which separates chains that receive each other.
+    /// Number of the network. Chains within radio range of each other need different network numbers.
     pub network: u16,
     /// Node number of the sender: 0 is Tx, 1 to N the relays, N + 1 Rx.
     pub sender: u16,
@@ -109,8 +109,8 @@ fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
 
-/// Completes a frame around its body of `body` bytes: header, tag, CRC, COBS. Returns the frame's length, or 0 if
-/// `body` is `None` or an address is too large.
+/// Adds header, tag, CRC and COBS to a frame in `out`, whose body of `body` bytes is already in place. Returns the
+/// frame's length, or 0 if `body` is `None` or a node number is too large.
 fn close(
     header: Header,
     flags: u16,
@@ -166,9 +166,10 @@ pub struct Opened<'a> {
     pub handshake: bool,
 }
 
-/// Parses `plain`, a frame without COBS and delimiter. The function checks the CRC, but neither the tag nor the body.
+/// Parses `plain`, a frame without COBS and delimiter. The function checks the CRC, but neither the authentication tag
+/// nor the body.
 ///
-/// The receiver checks the addresses before it decodes the body.
+/// The receiver checks the sender's and the destination's node numbers before it decodes the body.
 ///
 /// # Errors
 /// [`FrameError`]. The CRC is checked first, so every other error is about an intact frame.

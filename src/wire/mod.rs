@@ -19,19 +19,18 @@ use crc::{CRC_32_ISCSI, Crc, Table};
 
 /// CRC-32C (Castagnoli), the check sequence at the end of every frame. Constant work per byte.
 ///
-/// Its Hamming distance is 6 for the frame lengths used here; that of CRC-32 is 5. The table of 256 words takes 1 KiB
-/// of flash. Without a table a full sweep, for which the CRC is computed twice, is far above its budget of
-/// instructions.
+/// Its Hamming distance is 6 for the frame lengths used here (CRC-32: 5). Without the table (1 KiB of flash), a sweep
+/// message of maximum length, whose CRC is computed twice, takes far more instructions than allowed.
 pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
 /// Largest valid node number; 4095 is reserved for broadcasts.
 pub const MAX_NODE: u16 = 4094;
 
-/// Number of nearest nodes toward Tx, and toward Rx, to which hellos are sent. One of these nodes becomes the
-/// neighbour.
+/// Number of nearest nodes on each side, toward Tx and toward Rx, to which a relay sends hellos. One of these nodes
+/// becomes the relay's neighbour on that side.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Number of nearest relays with which Tx or Rx exchanges messages on a shared channel.
+/// Number of relays, the nearest ones, that exchange messages with Tx or Rx on a shared channel.
 pub(crate) const STATION_REACH: u16 = 2 * CANDIDATES;
 
 /// Maximum length on the wire of a sweep message with its frame, bytes. A sweep carries up to sixteen target SIRs.

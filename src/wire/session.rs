@@ -37,7 +37,7 @@ pub(crate) enum Sender {
     Itself,
     /// Second node with this node number, whose claim is not known. With signed frames it can be a forger.
     Unknown,
-    /// Second node with this node number, and its claim.
+    /// Second node that uses this relay's node number, and its claim to that number.
     Rival(Rival),
 }
 
@@ -49,13 +49,13 @@ pub(crate) struct Rival {
     pub(crate) newer_epoch: bool,
     /// True if the claiming node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the claim was certainly sent after this relay's start. The proof is a signature, or this relay's own
-    /// claim number in the message.
+    /// True if the claim was certainly sent after this relay's start. The proof is a signature, or a copy of this
+    /// relay's claim number in the message.
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number. The relay then keeps its node number if a second node
-/// starts with that number. The node with the larger claim number keeps it.
+/// Bit that a relay with a position sets in its claim number if a second node uses its node number. The claim number is
+/// then the larger one, and the node with the larger claim number keeps the node number.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -63,34 +63,33 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the numbers in two nonces of one node and epoch. A nonce's number is its lower half. A
-/// node draws a random first number at its start, and counts up from it. A larger difference therefore shows that two
-/// nodes use the same node number.
+/// Maximum difference between the lower halves of two nonces that one node makes in one epoch. The lower half is random
+/// at a node's start and then counts up. A larger difference therefore shows that two nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
-/// Number of consecutive handshakes of an older epoch that show that the node's epoch went back. Delayed frames can
-/// cause a smaller number.
+/// Number of successive handshakes that prove that a node has restarted with an older epoch. Delayed frames can cause
+/// fewer such handshakes.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// True if an authentication handshake to this node must be sent.
+    /// True if a handshake to the remote node of this table entry must be sent.
     handshake: bool,
-    /// True if the next handshake requests a reply in any case. False to request a reply only until the node has proved
-    /// its presence.
+    /// True if the next handshake to the remote node requests a reply in any case. If false, it requests a reply only
+    /// until the remote node has proved that it is present.
     requests_reply: bool,
-    /// True if the node has repeated this relay's nonce. The node is then present, and both nodes know each other's
-    /// nonce.
+    /// True if the remote node has sent this relay's nonce back. The remote node is then present, and the two nodes
+    /// know each other's nonce.
     proven: bool,
     /// Value of `Session::clock` at the last use of this table entry.
     used: u32,
     /// Time of the last frame that proved the node present. A handshake with the largest nonce so far also counts as
     /// proof.
     last_proof: Instant,
-    /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
+    /// Lower half of the nonce that this relay uses for frames to the remote node. The upper half is the epoch.
     own_number: u32,
-    /// Largest nonce that this relay has received from the node; 0 if none was received.
+    /// Largest nonce that the remote node has sent to this relay; 0 if none was received.
     nonce: u64,
     window: Window,
     older: OlderHandshakes,
@@ -108,8 +107,8 @@ struct OlderHandshakes {
 }
 
 impl OlderHandshakes {
-    /// Counts a handshake with an outdated nonce, of epoch `epoch` and frame counter `counter`. Returns true if it is
-    /// the fifth in a row (`WENT_BACK`) with this epoch and rising frame counters; replays do not count.
+    /// Counts a handshake with an outdated nonce, its epoch and its frame counter; ignores replays. Returns true at the
+    /// fifth (`WENT_BACK`) successive handshake of the same epoch with rising frame counters.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -141,7 +140,7 @@ impl Peer {
 pub(crate) struct Session {
     key: Key,
     epoch: u32,
-    /// Silence of a node after which a second node with the same node number is accepted in its place.
+    /// Silence of a remote node after which a second node with the same node number can replace it.
     gone_after: Duration,
     /// Random claim number that this relay draws at its start. If two nodes have the same node number, the one with the
     /// larger claim number keeps it. The lower halves of this relay's nonces count up from the claim number.
@@ -151,40 +150,41 @@ pub(crate) struct Session {
     /// Claim of a second node to this relay's node number, as shown by a handshake. `None` once the claim has been
     /// read.
     rival: Option<Rival>,
-    /// Number of uses of table entries so far, wrapping. Each entry stores it at its last use.
+    /// Number of uses of table entries so far, wrapping. Each entry stores the value of its last use.
     clock: u32,
     /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
     peers: heapless::Vec<Peer, PEERS>,
-    /// Number of the lease renewal in which this relay last sent its nonce in a handshake.
+    /// Number of the last lease renewal for which this relay has scheduled a handshake to show its nonce.
     shown: Option<u16>,
 }
 
 /// Result of authenticating a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// Valid message that was not received before, so its sender is present. `first` is true for the sender's first
-    /// proof of presence in the present session.
+    /// Valid message that was not received before, so its sender is present. `first` is true if this is the sender's
+    /// first proof of presence in the session with this relay.
     Fresh { first: bool },
-    /// New handshake that contains this relay's current nonce, so its sender is present. `first` is true for the
-    /// sender's first proof of presence in the present session.
+    /// New handshake that contains this relay's current nonce, so its sender is present. `first` is true if this is the
+    /// sender's first proof of presence in the session with this relay.
     Handshake { first: bool },
-    /// Handshake with the right tag but without this relay's current nonce. It can be a recorded handshake, so it does
-    /// not prove that its sender is present.
+    /// Handshake whose tag is valid, but without this relay's current nonce. An attacker may have recorded it, so it
+    /// does not prove that its sender is present.
     Unproven,
     /// Received frame without an authentication tag.
     Unsigned,
-    /// Frame whose tag does not match the nonces of the current session.
+    /// Frame whose tag is not the one computed with the key and the nonces of sender and receiver.
     Forged,
-    /// Authentic frame that was received before, or whose counter is too old to decide this.
+    /// Frame with a valid tag that was received before. Also a frame with a counter too old for the check of
+    /// duplicates.
     Replayed,
     /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,
 }
 
 impl Session {
-    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. After a node's
-    /// silence of `gone_after`, a second node with the same number can replace it.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. Once a remote node
+    /// has been silent for `gone_after`, a second node with the same number can replace it.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -221,8 +221,8 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes, as after a restart. New nonces count up from `claim`, or from the last nonce, whichever is
-    /// larger.
+    /// Removes all table entries, as after a restart. New nonces count up from `claim`, or from the last nonce if that
+    /// is larger.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.last_number {
             self.claim = claim;
@@ -231,8 +231,8 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`, once in each lease renewal `number`. The handshake contains this
-    /// relay's nonce, so that a second node with this relay's number detects the duplicate.
+    /// Schedules a handshake to node `to` if it has a table entry, once for each lease renewal `number`. The handshake
+    /// shows this relay's nonce, so that a second node with this relay's number detects the duplicate.
     pub(crate) fn show(&mut self, to: u16, number: u16) {
         if self.shown == Some(number) {
             return;
@@ -253,10 +253,10 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake that requests a reply from the silent node `to`.
+    /// Schedules a handshake that requests a reply from node `to`, from which no frames arrive any more.
     ///
-    /// Does nothing if the node has restarted in the same epoch. The handshake would tell the node its former nonce.
-    /// The node could then continue its former session, and use frame counters twice.
+    /// Does nothing if node `to` seems to have restarted in the same epoch: the handshake would show the node its
+    /// former nonce. With this nonce it could continue its former session, and use frame counters twice.
     pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;
@@ -271,7 +271,8 @@ impl Session {
         self.rival.take()
     }
 
-    /// Returns a node to which a handshake must be sent, and marks it as sent; `None` if there is none.
+    /// Returns a node to which a handshake is pending, and marks the handshake as sent. `None` if no handshake is
+    /// pending.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;
@@ -404,8 +405,8 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns the sender of `frame`, which bears this relay's number: this relay or a second node. Work: the
-    /// computation of one tag.
+    /// Returns the real sender of `frame`, whose header names this relay as the sender. Work: the computation of one
+    /// tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
@@ -456,9 +457,8 @@ impl Session {
 
     /// Creates a table entry for `node` if there is none.
     ///
-    /// If the table is full, it replaces an entry that is not pinned: if possible the entry of a node without proof of
-    /// presence, otherwise the least recently used one. After four billion entries it creates no more, because a nonce
-    /// must not be used twice.
+    /// A full table replaces its least recently used entry: entries without proof of presence first, pinned entries
+    /// never. Once all nonces of the epoch are used, it creates no further entry.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
@@ -509,7 +509,7 @@ const fn is_rival(one: u64, other: u64) -> bool {
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > MAX_GAP
 }
 
-/// Returns the nonces in a handshake's body: of its sender, and of its receiver. `None` if `frame` is no handshake.
+/// Returns the sender's and the receiver's nonce from a handshake's body. `None` if `frame` is no handshake.
 fn nonces_of(frame: &Opened<'_>) -> Option<Nonces> {
     let (other, rest) = frame.body.split_first_chunk::<8>()?;
     let (known, &[0 | 1]) = rest.split_first_chunk::<8>()? else {

@@ -19,8 +19,8 @@ pub struct Upload {
     /// Valid parameters of the uploaded mission. It has a single interferer: a mission with an interference field
     /// cannot be uploaded.
     config: MissionConfig,
-    /// Positions of Tx and Rx of this mission; `None` for the positions in the relays' configuration. The positions are
-    /// valid, but each relay still checks that they fit the mission.
+    /// Positions of Tx and Rx in the uploaded mission; `None` to use the relays' configured positions. The coordinates
+    /// are valid, but each relay still checks the positions against its mission and settings.
     sites: Option<Sites>,
 }
 
@@ -38,10 +38,10 @@ pub enum UploadError {
     Field,
     /// A parameter of the new mission is outside its range.
     Mission(MissionError),
-    /// The upload was not made for the mission that this relay loaded before flight.
+    /// The upload is for relays that loaded a different mission before flight than this relay.
     Base,
-    /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. Or these positions
-    /// are invalid, or the distance between them is not the mission's distance.
+    /// The uploaded mission, or its positions of Tx and Rx, are rejected: see [`LineError`]. Possible reasons are
+    /// invalid positions, a wrong distance between them, the geofence, and the settings.
     Line(LineError),
     /// The relay already has the uploaded mission or a newer mission.
     Old,
@@ -94,7 +94,8 @@ impl Upload {
         Self::checked(version, digest(base), config, None)
     }
 
-    /// Adds the positions of Tx and Rx to the uploaded mission. Relays compute latitudes and longitudes from them.
+    /// Adds the positions of Tx and Rx to the uploaded mission. From these positions the relays compute the latitudes
+    /// and longitudes of their setpoints.
     ///
     /// Without this call, relays use the Tx and Rx positions of their configuration, even if an earlier upload had
     /// different positions.
@@ -137,7 +138,7 @@ impl Upload {
         self.version
     }
 
-    /// Digest of the mission loaded before flight, which the upload replaces.
+    /// Digest of the mission that the relays loaded before flight. The upload replaces this mission.
     pub const fn base(&self) -> u16 {
         self.base
     }
@@ -161,8 +162,8 @@ impl Upload {
     }
 }
 
-/// Mission uploaded by the operator. The type is uninhabited without the feature `upload`, so that the compiler drops
-/// all code that handles one.
+/// Mission uploaded by the operator. Without the feature `upload` the type has no values. The compiler therefore drops
+/// all code that handles an uploaded mission.
 #[cfg(not(feature = "upload"))]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Upload {}

@@ -7,7 +7,7 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, write};
 
-/// Hello message: the sender's neighbour, the nodes that it receives, its view and its mission.
+/// Hello message: state of the sender, with its neighbour, the nodes that it receives, and its mission.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "eight flags of the wire format"
@@ -17,42 +17,43 @@ use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag
 pub struct Hello {
     /// [`digest`](crate::wire::digest::digest) of the sender's mission as loaded before flight.
     pub mission: u16,
-    /// Identifier of the latest view known to the sender.
+    /// Identifier of the latest view (agreed members of the chain) that the sender knows.
     pub latest_view: ViewId,
-    /// Node number of the sender's neighbour on the side where the destination is; 0 for none.
+    /// Node number of the sender's neighbour toward the destination of this hello; 0 for none.
     pub neighbour: u16,
     /// True if the sender requests a hello in return.
     pub requests_reply: bool,
     /// True if the sender requests a new view (agreed members of the chain).
     pub requests_view: bool,
-    /// True if the sender has not taken part in any pass or view since its start.
+    /// True until the sender first takes part, after its start, in a pass along the chain or in a view.
     pub fresh: bool,
-    /// Readiness of the sender or of the destination.
+    /// Readiness of the sender or of the destination. Its meaning depends on which of them is in the chain.
     ///
-    /// - If both nodes are in the chain: true if the sender could be inserted between the destination and the neighbour
-    ///   that the destination has selected on the sender's side.
+    /// - If both are in the chain: true if the sender could become a relay between the destination and the neighbour that
+    ///   the destination has at present toward the sender.
     /// - If the sender is outside of the chain: true if it would join the chain when it is called.
     /// - If the destination is outside of the chain: true if the destination is called to join.
     pub ready: bool,
-    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. Counted are
-    /// the connected relays from the sender on, in the direction away from the destination.
+    /// Number of relays that the destination can reach through the sender, which counts, too: 1 to 1000. These relays
+    /// are linked in a row that begins with the sender and leads away from the destination.
     pub behind: u16,
-    /// Nodes that the sender receives on the side where the destination is. Bit i, 0 to 3, stands for the node whose
-    /// number differs from the sender's by i + 1.
+    /// Nodes that the sender receives in the direction of this hello's destination, as a bit mask. Bit i, 0 to 3,
+    /// stands for the node whose number differs from the sender's by i + 1.
     pub hears: u8,
     /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,
     /// True if the sender uses the mission `latest_mission` now.
     pub active: bool,
-    /// True if all relays of the sender's view use `latest_mission`, a mission uploaded in flight.
+    /// True if all relays of the sender's view (agreed set of relays) use the mission `latest_mission`. Always false
+    /// for a mission that was loaded before flight.
     pub active_in_view: bool,
-    /// True if the sender, or a relay farther from the destination, refuses the mission `latest_mission`.
+    /// True if a relay refuses the mission `latest_mission`: the sender, or a relay behind it. A relay is behind the
+    /// sender if the sender is between it and the destination.
     pub refused: bool,
-    /// Flag for a node outside of the chain.
+    /// Flag for a node outside of the chain. Its meaning depends on `fresh`.
     ///
-    /// - With `fresh`, the sender is outside of the chain, and no relay selects it.
-    /// - Without `fresh`, the destination is outside of the chain. The chain has agreed on a view without it, and the
-    ///   relays of this view are in place.
+    /// With `fresh`: the sender is outside of the chain, and no relay has it as a neighbour. Without `fresh`: the
+    /// destination is outside of the chain, and the relays of an agreed view without the destination are in place.
     pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,
@@ -136,14 +137,15 @@ impl Hello {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
     /// Random claim number of the claiming node. If two nodes have the same node number, the node with the larger claim
-    /// number keeps it. A node draws its claim number at its start, and raises it at most once while it is active.
+    /// number keeps it. A node draws its claim number at its start. While it keeps its node number, it raises the claim
+    /// number at most once.
     pub number: u32,
     /// Last claim number received from a second node with the claiming node's node number; 0 for none.
     pub other_number: u32,
     /// True if the claiming node is passive because a second node uses its node number.
     pub passive: bool,
-    /// True for an echo: the sender returns a claim to the destination's node number. If two nodes have this number,
-    /// both receive the echo, and each learns the claim of its duplicate.
+    /// True for an echo: the sender returns a claim of a node with the destination's node number. If two nodes have
+    /// this number, both receive the echo, and each learns the claim of the other.
     pub echo: bool,
 }
 
@@ -169,7 +171,7 @@ impl Claim {
 }
 
 /// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit of x
-/// that keeps two neighbours separated. `line_digest` is the digest in the message.
+/// that keeps two neighbours separated. The receiver compares `line_digest` with its own digest of the x axis.
 pub(super) fn encode_fence(line_digest: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, line_digest);
     let numbers = [fence.echo, fence.number].map(Word::new);

@@ -42,7 +42,7 @@ pub const MAX_BODY: usize = if Upload::OFFER > LONG {
 
 #[cfg(not(feature = "upload"))]
 impl Upload {
-    /// Length of an offer's body without an upload, bytes: its tag.
+    /// Length of an offer's body if the crate is built without uploads, bytes: the message tag alone.
     const OFFER: usize = 1;
 
     const fn encode_offer(&self, _: u16, _: &mut [u8]) -> Option<usize> {
@@ -60,7 +60,7 @@ impl Upload {
 /// a pass: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each target.
+    /// Message to the next relay: target SIRs, and for each target the sender's farthest x that meets it.
     Sweep(Sweep),
     /// Reply to a sweep of target SIRs: the result for each target.
     Verdict(SweepVerdict),
@@ -85,17 +85,18 @@ pub enum Message {
     Gathered(Roster),
     /// Message to the next relay: interference estimate, and all relays' measurements so far.
     Sense(Heard),
-    /// Reply to `Sense`: measurements of the sender and of all later relays.
+    /// Reply to `Sense`: measurements of the sender and of all relays that the pass has reached after it.
     Sensed(Heard),
-    /// Message to the next relay: token of Algorithm 2. The relay with the token moves to a better position.
+    /// Message to the next relay: token of Algorithm 2 (stepwise improvement of the positions). The relay that receives
+    /// the token may move to a position with a better SIR.
     Token(Token),
-    /// Reply to a token of Algorithm 2: position of the sender, and SIR of the worst hop after the sender.
+    /// Reply to `Token`: position of the sender, and SIR of the worst hop from the sender on.
     Moved(Moved),
-    /// Message to the next relay: lease renewal by the view's leader.
+    /// Message to the next relay: lease renewal, which the leader of the view (agreed members) sends.
     Pulse(Pulse),
     /// Reply to a lease renewal: its acknowledgement.
     Pulsed(Pulsed),
-    /// Message toward Tx or toward Rx, not only to neighbours: the sender's neighbours and view.
+    /// Hello: state of the sender, sent toward Tx or toward Rx, also to nodes that are not neighbours.
     Hello(Hello),
     /// Message to the next relay: proposal of a new view (membership of the chain), with the votes so far.
     Proposal(Proposal),
@@ -113,7 +114,7 @@ pub enum Message {
     Offer {
         /// Uploaded mission that the sender offers.
         upload: Upload,
-        /// Nonce in the destination's hello that the offer answers, 0 for none.
+        /// Nonce from the hello that the destination sent and that this offer answers; 0 for none.
         offer_number: u16,
     },
     /// Ground to relay: interference level measured at Tx or Rx.
@@ -137,8 +138,8 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest in the message; `None` for a message without one. By the digest the receiver detects that its
-    /// mission, view or x axis differs from the sender's.
+    /// Returns the digest that is encoded in the message; `None` for a message without one. The receiver compares it
+    /// with its own digest, to detect that its mission, view or x axis differs from the sender's.
     pub fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -165,8 +166,8 @@ impl Message {
         }
     }
 
-    /// Returns true for messages of passes along the chain and of lease renewals. Their digest identifies mission and
-    /// view.
+    /// Returns true for lease renewals, messages that make a pass along the chain, and their replies. The digest in
+    /// these messages identifies the mission and the view (agreed members of the chain).
     pub(crate) const fn belongs_to_view(&self) -> bool {
         matches!(
             self,
@@ -183,13 +184,14 @@ impl Message {
         )
     }
 
-    /// Returns true for messages of a view change. Their digest identifies the proposed mission.
+    /// Returns true for messages that change the view (agreed members of the chain). The digest in these messages
+    /// identifies the proposed mission.
     pub(crate) const fn is_view_change(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward in the direction of a pass. These are passes, proposals and lease
-    /// renewals, but not the replies to them.
+    /// Returns true for messages that relays forward along the chain, and false for their replies. Relays forward the
+    /// messages of passes, view proposals and lease renewals.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

@@ -8,7 +8,7 @@ use crate::geodetic::{SITES_LENGTH, Sites};
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
-/// Encoding in an offer message, which repeats the number of the hello that it answers.
+/// Encoding in an offer message. The offer answers a hello, and repeats the `offer_number` of this hello.
 impl Upload {
     /// Length of an offer's body, bytes.
     pub(super) const OFFER: usize = Self::LENGTH + size_of::<Word>();
@@ -52,14 +52,15 @@ impl Upload {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Version of the upload, and digest of the mission loaded before flight, which this upload replaces.
+    /// Version of the uploaded mission, and digest of the mission loaded before flight that it replaces.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// Required ratio of the SIR from Rx to Tx to the SIR from Tx to Rx, and transmit power of Rx, W.
+    /// Two values for data toward Tx: the mission's `reverse`, and the transmit power of Rx, W. Hops toward Tx need
+    /// `reverse` times the SIR that hops toward Rx need.
     back: [f32; 2],
     /// SNR gap of fitted time slots, each as long as its hop needs; 0 for equal slots.
     fitted_gap: f32,

@@ -89,8 +89,8 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum of the x values and of the chain's slacks in a message, m. The last hop is limited to 1e9 m; twice this value leaves room for
-/// the sum of a position (at most 1e6 m) and that hop.
+/// Maximum of the x values and of the slacks (reserves in length of the chain) in a message, m. The hop to Rx is
+/// limited to 1e9 m; twice this value leaves room for the sum of a position (at most 1e6 m) and that hop.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -120,7 +120,8 @@ pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
 
-/// Returns the position above the line at `x_m` and `altitude_m`, m, of a relay of `power_w` watts.
+/// Returns the position of a relay on the vertical plane through Tx and Rx, from its x and altitude, m. `power_w` is
+/// the transmit power of the relay, W.
 ///
 /// # Errors
 /// [`MessageError::Value`] if one of the three numbers is out of range.

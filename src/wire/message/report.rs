@@ -20,8 +20,8 @@ const STATES: u16 = 57_344;
 
 /// Number of values of [`Entry::refusal`].
 ///
-/// One value for no refusal. Eight values for another mission and eight for another key: four nodes toward Tx and four
-/// toward Rx.
+/// 0 means no refusal. Values 1 to 8 mean a refused node with another mission, 9 to 16 one with another key. Each group
+/// has four values for nodes toward Tx and four for nodes toward Rx.
 const REFUSALS: u16 = 17;
 
 /// Upper 16 bits of the largest finite f32.
@@ -79,8 +79,8 @@ pub struct Entry {
 impl Entry {
     /// Creates an entry on a relay, whose state is `age` tenths of a second old.
     ///
-    /// `relay` is its number, plus 1000 times its [refusal](Entry::refusal). `state` combines its phase, hold reasons,
-    /// control state and flags: see [`Entry::state`].
+    /// `relay` is the relay's number plus 1000 times the code of [`refusal`](Entry::refusal). `state` combines the
+    /// relay's phase, reasons to wait, control state and flags: see [`Entry::state`].
     pub const fn new(relay: u16, age: u8, state: u16, at: Coarse) -> Self {
         Self {
             relay: Word::new(relay),
@@ -113,17 +113,18 @@ impl Entry {
         self.relay.number().saturating_sub(1) / MAX_RELAYS
     }
 
-    /// Returns the relay's combined state as one number. Its digits are the phase, two hold reasons, flags, the
-    /// control state and a flag.
+    /// Returns the relay's combined state: a sum of six values, each multiplied by its unit.
     ///
-    /// Their units are 1, 8, 64, 512, 4096 and 28672.
+    /// In order: phase (unit 1), two hold reasons (8 and 64), three flags (512), control state (4096), and one flag
+    /// (28672).
     pub const fn state(&self) -> u16 {
         self.state.number()
     }
 
     /// Returns the control state of the drone, from 1; 0 without an autopilot.
     ///
-    /// From 3 the drone is in the air: standby, engaged, blind, and engaged with a refused setpoint.
+    /// In the states from 3 on, the drone is in the air. These are in order: standby, engaged, blind, and engaged with
+    /// a refused setpoint.
     #[doc(hidden)]
     pub const fn control(&self) -> u16 {
         self.state.number() / 4096 % 7
@@ -242,7 +243,7 @@ impl Reports {
         digest.map_or(0, |digest| u16::from_le_bytes(*digest))
     }
 
-    /// Returns no states, since they are not decoded.
+    /// Returns an empty list, because a relay without the feature `telemetry` does not decode reports.
     #[expect(clippy::unused_self, reason = "as with the feature")]
     pub(crate) const fn states(&self) -> (Option<Detail>, &[Entry]) {
         (None, &[])

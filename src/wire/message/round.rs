@@ -18,10 +18,10 @@ use crate::wire::message::parts::{
     require, tag, take, take_targets, write,
 };
 
-/// Sweep message: target SIRs, and the farthest x at which the sender meets each target.
+/// Sweep message: target SIRs, and for each target the sender's farthest x that meets it.
 ///
-/// The message travels along the chain in a pass. "Farthest" means in the direction of the pass: the target is missed
-/// at every x beyond it.
+/// The message travels along the chain in a pass. "Farthest" is in the direction in which the message travels: at every
+/// x after the farthest x, the hop to the sender misses the target.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -32,24 +32,24 @@ pub struct Sweep {
     pub ladder: Ladder,
     /// Lateral offset, altitude and transmit power of the sender.
     pub relay: Station,
-    /// True if relays use the lateral offsets and altitudes of the joint method. False if they use the configured
-    /// values.
+    /// True if relays use offsets and altitudes that are optimised together with x (method `Joint`). False if they use
+    /// the configured lateral offsets and altitudes.
     pub chosen: bool,
     /// Measured mean of 1 / I (Upsilon) at the sender's position, in 1/W; I is the interference power. `None` if the
     /// receiver must use the mission's interference field.
     pub measured_per_w: Option<f32>,
-    /// Farthest x, in the direction of the pass, at which the sender meets each target SIR, m. The list begins with the
-    /// lowest target, and ends before the first target that cannot be met.
+    /// List of the sender's farthest x, m, in the direction of the pass, that meets each target SIR. The list begins
+    /// with the lowest target, and ends before the first target that cannot be met.
     pub reaches: PerTarget,
 }
 
-/// Fields at the start of all kinds of sweep messages. The list of the sender's farthest x follows at the end of the
-/// message.
+/// Fields at the start of all kinds of sweep messages. The list of farthest x, one for each target SIR, is at the end
+/// of the message.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the rest. A negative sign marks
-    /// a plain pass, in which every relay takes the farthest x that meets the target.
+    /// Lower of the two middle target SIRs, or the only target. The other targets follow from `gap` and `growth`. A
+    /// negative sign marks a plain pass, in which every relay takes the farthest x that meets the target.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -76,8 +76,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured interference
-    /// (Upsilon) or the lateral offset is encoded between the head and the list of farthest x.
+    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. If the sweep has a measured
+    /// interference or a lateral offset, this number precedes the list of farthest x.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -140,13 +140,14 @@ pub struct SweepVerdict {
     pub number: u16,
     /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Verdict of the sweep: the chain's slack for each target, and the committed target, if any.
+    /// Result of the sweep: the target that the chain commits to, if any, and the slack for each target. The slack is
+    /// the maximum length of a chain that meets the target, less the distance from Tx to Rx.
     pub verdict: Verdict,
-    /// x that the destination must take if a target is committed, m. `None` for the farthest x that the destination has
-    /// reported for this target.
+    /// x to which the destination of this reply must move if a target is committed, m. If it is `None`, the destination
+    /// takes the farthest x that it sent for this target in its sweep message.
     pub required_x_m: Option<f32>,
-    /// True if the sender or a later relay of the pass has a profile of its own. Its power or fixed altitude then
-    /// differs from the mission's common profile.
+    /// True if the sender, or a relay after it in the pass, has an individual profile (altitude and power). The power
+    /// or the fixed altitude of such a relay differs from the mission's common profile.
     pub own: bool,
 }
 
@@ -188,9 +189,9 @@ pub const MOST_NAMED: usize = 8;
 /// Profile of a relay, altitude and power, that differs from the mission's common profile.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Index of the relay among the members of the view, 1 next to Tx.
+    /// Index of the relay among the members of the view. The relay next to Tx has index 1.
     pub index: u16,
-    /// Fixed altitude of the relay, m; 0 if the relay chooses its altitude.
+    /// Fixed altitude of the relay, m; 0 if the altitude is not fixed and the relay chooses it.
     pub held_m: f32,
     /// Transmit power of the relay, W.
     pub power_w: f32,
@@ -199,15 +200,15 @@ pub struct OwnSeat {
 /// List of relay profiles (altitude and power), by rising index of the relays.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles (altitude and power). The message of a pass has the profiles of the relays up
-/// to the sender, the reply those of the whole chain.
+/// Message that collects relay profiles (altitude and power). On the way along the chain it has the profiles of the
+/// relays up to the sender. The reply has the profiles of all relays of the chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
     /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Index of the last relay whose profile earlier passes collected; 0 in the first pass.
+    /// Index of the relay up to which earlier passes have collected the profiles; 0 in the first pass.
     pub after: u16,
     /// Profiles of relays with an index above `after`. If the list is full, the next pass collects the remaining
     /// profiles.
@@ -257,7 +258,7 @@ impl Roster {
     }
 }
 
-/// Token message of Algorithm 2, in which the relays improve their positions in turn.
+/// Token message of Algorithm 2, in which one relay after the other improves its position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -268,7 +269,7 @@ pub struct Token {
     pub place: Placement,
     /// Transmit power of the sender, W.
     pub power_w: f32,
-    /// Action of each relay that receives the token in this pass.
+    /// Action that every relay takes when it receives the token in this pass: look, move or stop.
     pub turn: AdjustStep,
     /// SIR of the chain's worst hop before this pass, linear; 0 if unknown.
     pub sir: f32,
@@ -299,11 +300,11 @@ impl Token {
     }
 }
 
-/// Action required of each relay that receives the token of Algorithm 2.
+/// Action of each relay that receives the token of Algorithm 2 (stepwise improvement of the positions).
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// The relay stays, and only stores its neighbours' positions.
+    /// The relay keeps its position, and only stores the positions of its neighbours.
     Look,
     /// The relay moves if a position with a better SIR than its current position exists.
     Move {
@@ -312,11 +313,12 @@ pub enum AdjustStep {
         /// Search method for a position with a better SIR.
         local: Local,
     },
-    /// The relay no longer moves, because Algorithm 2 has ended.
+    /// The relay stops moving, because Algorithm 2 (stepwise improvement of the positions) has ended.
     Stop,
 }
 
-/// Action of a token on the wire: its kind, and three numbers. Numbers that the kind does not use are 0.
+/// Action of each relay as encoded in a token message: its kind, and the parameters of a move. Parameters that the kind
+/// does not use are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct StepBody {
     kind: u8,
@@ -372,7 +374,7 @@ impl StepBody {
     }
 }
 
-/// Reply to a token of Algorithm 2; relays send it back to the leader.
+/// Reply to a token of Algorithm 2 (stepwise improvement of positions), sent back toward the leader.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
     /// Number of the pass of Algorithm 2 in which the token was received.
@@ -381,9 +383,9 @@ pub struct Moved {
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
-    /// True if the sender, or a later relay of the pass, has moved in this pass.
+    /// True if the sender has moved in this pass, or any relay that received the token after the sender.
     pub position_changed: bool,
-    /// SIR of the worst hop after the sender in the direction of the pass, linear.
+    /// SIR of the worst hop, linear, among the hops that follow the sender in the direction of the pass.
     pub worst_sir: f32,
     /// Transmit power of the sender, W.
     pub power_w: f32,
@@ -415,12 +417,12 @@ fn is_sir(sir: f32) -> bool {
     (0.0..=f32::MAX).contains(&sir)
 }
 
-/// Length of a sensing message's body, bytes. It has the tag, the pass, the estimate, the sums, the interference level
-/// at Rx, and the excluded node.
+/// Length of a sensing message's body, bytes. The terms are the message tag, the pass number and digest, the estimate,
+/// the sums, the interference level at Rx, and the excluded relay's number.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: interference estimate, and sums of measurements. In a pass the sums cover the relays up to the
-/// sender, in the reply the sender and all later relays.
+/// Sensing message: interference estimate, and sums of measurements. On the way along the chain the sums cover the
+/// relays up to the sender. In the reply they cover the sender and the relays that the message reached after it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -433,12 +435,13 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict those of all other relays; 0 for none. Its measurements are
-    /// left out of `sums`. Set in replies only.
+    /// Number of the relay whose measurements are inconsistent with those of the other relays; 0 for none. Its
+    /// measurements are left out of `sums`. The number is set only in replies (`Sensed`).
     pub excluded: u16,
 }
 
-/// Interference estimate on the wire: its number, its kind, and four values. Values that the kind does not use are 0.
+/// Interference estimate on the wire: its number, its kind, an interferer, and the interference at Rx. Values that the
+/// kind does not use are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct EstimateBody {
     number: Word,
@@ -498,7 +501,7 @@ impl EstimateBody {
     }
 }
 
-/// Measurement sums on the wire: two successive arrays of nine numbers.
+/// The 18 measurement sums on the wire, as two arrays of nine numbers each.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {

@@ -16,7 +16,7 @@ pub struct Proposal {
     pub mission_id: MissionId,
     /// Identifier of the proposed view, later than every view known to its proposer.
     pub proposed_view: ViewId,
-    /// Number of relays that the proposal has reached, including the sender, 1 to 1000.
+    /// Number of relays that the proposal has reached on its way: 1 to 1000. The sender is included.
     pub place: u16,
     /// Votes of the relays up to the sender, and their remaining leases.
     pub poll: Poll,
@@ -27,25 +27,25 @@ pub struct Proposal {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
-    /// Newest view (membership) that a polled relay knows to be agreed on. Only its members have a vote.
+    /// Newest agreed view (set of members) that any polled relay knows. Only members of this view have a vote.
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of the view `agreed` was polled. For the initial view the leader counts as the proposer. If
-    /// the proposer was polled, exactly half of the members' votes are enough for a quorum.
+    /// True if the relay that once proposed the view `agreed` was polled. For the initial view, this relay is the
+    /// leader. If it was polled, exactly half of the members' votes are enough for a quorum.
     pub proposer: bool,
-    /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
+    /// Upper bound of the remaining leases of members of `agreed` that were not polled, tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Until
-    /// then relays must not use positions of the new view.
+    /// Time until all leases of views older than `agreed` have expired, in tenths of a second. 65535 if unknown. During
+    /// this time, relays must not use positions of the proposed view.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a polled member has accepted; `None` if there is none. The chain may have agreed
-    /// on this view already.
+    /// Latest view newer than `agreed` that a polled member has accepted; `None` if there is no such view. The chain
+    /// may have agreed on this view already.
     pub successor: Option<Successor>,
 }
 
 impl Poll {
-    /// Returns the state of a poll before any relay has voted. `agreed` is the view whose members vote.
+    /// Returns an empty poll: no relay has voted. `agreed` is the view whose members vote.
     pub(crate) const fn of(agreed: View) -> Self {
         Self {
             agreed,
@@ -58,13 +58,15 @@ impl Poll {
     }
 }
 
-/// View that a polled relay has accepted in an earlier decision. The chain may have agreed on this view already.
+/// View that a polled relay accepted when an earlier proposal was decided. The chain may have agreed on this view
+/// already.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
     /// Identifier of the proposal on which the view was decided.
     pub proposal: ViewId,
-    /// Decided view: the proposed view, or an earlier view that the vote has found to be decided already.
+    /// View that the decision on the proposal `proposal` adopted. This is the view of that proposal, or an older view
+    /// that the vote found to be decided already.
     pub view: View,
 }
 
@@ -80,13 +82,13 @@ pub struct Decision {
     pub place: u16,
     /// Number of relays that the proposal has reached: 1 to 1000.
     pub reached: u16,
-    /// Newest view that any polled relay knows to be agreed on. The decided view replaces it.
+    /// Newest agreed view that any polled relay knows. The view in `accepted` replaces it.
     pub base: View,
-    /// View to accept; `None` without a quorum. It is the proposed view, or an earlier view that was found to be
-    /// decided already.
+    /// View that the relays must accept; `None` without a quorum. This is the proposed view, or an older view that the
+    /// vote found to be decided already.
     pub accepted: Option<View>,
-    /// Time until relays are allowed to use positions of the accepted view, in tenths of a second. Until then, members
-    /// of the previous view that were not polled can still have a lease.
+    /// Time until relays may use positions of the accepted view, in tenths of a second. During this time, members of an
+    /// older view that did not vote can still have a lease.
     pub usable_in: u16,
 }
 
@@ -142,7 +144,7 @@ impl SizedBody {
     }
 }
 
-/// Returns true if a view with this identifier and number of relays can exist.
+/// Returns true if the identifier and the number of relays of `view` are in their valid ranges.
 fn is_view(view: View) -> bool {
     (view.id == ViewId::LOADED || view.id.is_proposed()) && is_size(view.relays)
 }
@@ -174,7 +176,8 @@ impl Proposal {
         )
     }
 
-    /// Decodes a proposal. Rejects it if the agreed view or the accepted view is not earlier than the proposed view.
+    /// Decodes a proposal. Rejects it unless the views in its poll (`agreed` and `successor`) are earlier than the
+    /// proposed view.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(Word::number);
@@ -281,7 +284,8 @@ pub struct Pulse {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
-    /// Node that is allowed to leave the chain, 0 for none. Its neighbours then select each other.
+    /// Node that is allowed to leave the chain, 0 for none. The two neighbours of this node then select each other as
+    /// neighbours.
     pub leaver: u16,
     /// Node outside of the chain that is called to join it, 0 for none.
     pub joiner: u16,
@@ -297,8 +301,8 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by relays that need to leave or are ready to join. They come from the relays between the last
-/// relay and the sender, both included.
+/// Requests to the leader by relays that need to leave the chain or are ready to join it. They come from all relays
+/// from the chain's last relay up to the sender of this message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
@@ -306,9 +310,9 @@ pub struct Requests {
     pub leaver: u16,
     /// Remaining endurance of the node `leaver`, s; 65535 if unknown, 0 if it has the order to leave.
     pub endurance_s: u16,
-    /// Node outside of the chain that is ready to join it, 0 for none.
+    /// Spare that is ready to join the chain: the number of a node outside of the chain, 0 for none.
     pub spare: u16,
-    /// True if all relays from the last relay to the sender are at their positions.
+    /// True if the chain's last relay, the sender, and all relays between them are at their positions.
     pub in_place: bool,
 }
 
@@ -320,8 +324,10 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. If both parts have a departure, the more urgent one counts. If
-    /// both have a spare, that of the more urgent departure counts; without a departure that with the lower number.
+    /// Merges the requests of two parts of the chain. The more urgent departure is kept.
+    ///
+    /// If both parts have a spare, the spare of the part with the more urgent departure is kept. If no part has a
+    /// departure, the spare with the lower number is kept.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
@@ -352,7 +358,7 @@ pub struct Pulsed {
     pub view_digest: u16,
     /// True if the renewal has reached the last relay of the chain. False if the renewal is still on its way.
     pub done: bool,
-    /// Requests of the relays from the last relay to the sender. They have no meaning while `done` is false.
+    /// Requests of all relays from the chain's last relay up to the sender. They have no meaning while `done` is false.
     pub requests: Requests,
 }
 
@@ -362,7 +368,8 @@ struct RenewalBody {
     pass: PassId,
     number: Word,
     in_place: bool,
-    /// Node that leaves (lower half) and node that joins, as a u32; `None` if both are 0.
+    /// Numbers of two nodes: leaving node in the lower half, joining node in the upper half of a u32. `None` if both
+    /// numbers are 0.
     nodes: Option<[u8; 4]>,
 }
 
@@ -377,7 +384,7 @@ impl RenewalBody {
         }
     }
 
-    /// Returns the nodes that leave and join, 0 for none.
+    /// Returns the numbers of the leaving node and the joining node, 0 for none.
     ///
     /// # Errors
     /// [`MessageError::Value`] if a number is above 1000, or if both numbers are 0 but `nodes` is not `None`.

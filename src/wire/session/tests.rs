@@ -10,7 +10,7 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// Capacity of the session table ([`PEERS`]), in the type of node numbers.
+/// Capacity of the session table, equal to [`PEERS`] but of the type `u16`, like node numbers.
 const ROOM: u16 = 8;
 
 /// Silence after which a node is forgotten; the value of `Settings::dead_after`.
@@ -63,7 +63,7 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Lets two nodes exchange handshakes until none is pending; returns the number of handshakes. `ends` are the nodes'
+/// Passes handshakes between two nodes until none is pending; returns the number of handshakes. `ends` are the nodes'
 /// sessions and node numbers, `counters` their frame counters.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
@@ -337,8 +337,8 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks which frames under the relay's own number reveal a second node with that number. Only a handshake with the
-/// same key, and with an epoch that is not older than the relay's, does.
+/// Checks which frames with the relay's own number as the sender reveal a second node with that number. Only handshakes
+/// with the relay's key and with an epoch at least as new as the relay's reveal it.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -382,8 +382,8 @@ fn own_frames_are_recognised() {
     }
 }
 
-/// Checks that two nodes with the same number are detected. Node 1 accepts the node with the larger claim. The reply of
-/// node 1 to the node with the smaller claim contains the larger claim.
+/// Checks that two nodes with the same number are detected by their handshakes to node 1. Node 1 accepts the node with
+/// the larger claim. Its reply to the node with the smaller claim contains the larger claim.
 #[test]
 fn the_smaller_claim_receives_the_larger_one() {
     const FAR: u32 = 1 << 20;
@@ -427,9 +427,9 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks when the node with the smaller claim can replace a node of the same number. The node with the smaller claim
-/// is accepted once the node with the larger claim is silent. Recorded frames of the node with the larger claim are
-/// then rejected, until that node sends new frames.
+/// Checks when a node with a smaller claim replaces the node of the same number with a larger claim. The node with the
+/// smaller claim is accepted once the node with the larger claim is silent. Recorded frames of the node with the larger
+/// claim are then rejected, until that node sends new frames.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

@@ -89,7 +89,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     show(options, &report)
 }
 
-/// Starts the screen that the options request, if any, and prints its address.
+/// Starts the web page that shows the flight, if the options request it, and prints the page's address.
 fn screen(options: &Options) -> Result<Option<Screen>, Failure> {
     let Some(address) = options.web.address else {
         return Ok(None);
@@ -108,7 +108,7 @@ fn screen(options: &Options) -> Result<Option<Screen>, Failure> {
     Ok(Some(screen))
 }
 
-/// Time between two snapshots on the screen.
+/// Time between two snapshots of the chain on the web page, in real time.
 const FRAME: Duration = Duration::from_millis(100);
 
 /// Runs the simulated chain `speed` times faster than real time, and shows it on `screen`.
@@ -142,7 +142,8 @@ fn fly(
     Ok(chain.finish())
 }
 
-/// Runs the simulated chain until the run ends, writes its frames to `capture`, and shows the progress.
+/// Runs the simulated chain until its run ends, and shows the progress on the terminal. Meanwhile the frames of the
+/// chain are written to `capture`, if there is one.
 fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(), Failure> {
     let mut line = Progress::begin();
     while !chain.step(20_000) {
@@ -170,7 +171,7 @@ fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     }
 }
 
-/// Minimum duration of a run after which its progress line is shown.
+/// Time from the start of a run until its progress line appears.
 const SILENT: Duration = Duration::from_secs(1);
 
 /// Minimum time between two updates of the progress line.
@@ -194,7 +195,8 @@ impl Progress {
         }
     }
 
-    /// Writes `text` to the progress line. Does nothing at the start of a run, and shortly after the last update.
+    /// Writes `text` to the progress line. Does nothing within the time [`SILENT`] from the start of the run, or within
+    /// the time [`EVERY`] from the last update.
     fn show(&mut self, text: impl FnOnce() -> String) {
         let elapsed = self.started.elapsed();
         let is_due = self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);
@@ -228,7 +230,8 @@ struct AirCapture {
 }
 
 impl AirCapture {
-    /// Creates the capture file `file`. Its comment has the number of relays, the seed and the key of `setup`.
+    /// Creates the capture file `file`. The comment in the file has the number of relays, the seed and the key of
+    /// `setup`.
     fn begin(file: &Path, setup: &Setup) -> Result<Self, Failure> {
         // The key is not secret: it is drawn from the seed, for this run only.
         let key = setup.secret().map_or_else(String::new, |key| {

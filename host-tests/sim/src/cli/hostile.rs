@@ -69,10 +69,10 @@ pub struct RelayEvent {
     at: Instant,
 }
 
-/// Time for which an attack continues after the last other event, s.
+/// Time from the last planned event of the run to the end of an attack, s. An attack is no such event.
 const ATTACK_S: u64 = 30;
 
-/// Time after the last planned event at which a run ends at the latest, s of virtual time.
+/// Time from the last planned event of a run to the deadline of the run, s of virtual time.
 const PATIENCE_S: u64 = 3_600;
 
 impl Hostile {
@@ -89,7 +89,7 @@ impl Hostile {
         self.forge.is_some() || self.replay.is_some()
     }
 
-    /// Returns the virtual time of the last event that the options request, not counting attacks.
+    /// Returns the virtual time of the last event that the options request. Attacks are left out.
     fn last(&self) -> Instant {
         let ones = self.kill.iter().chain(&self.boot).map(|one| one.at);
         let parts = self
@@ -104,7 +104,7 @@ impl Hostile {
         all.max().unwrap_or(Instant::ZERO)
     }
 
-    /// Checks that the options are consistent with each other and with a chain of `uavs` relays.
+    /// Checks that the options do not contradict each other, and fit a chain of `uavs` relays.
     ///
     /// `is_loop` is true if `--closed-loop` is given. Options for failures, attacks, uploads or simulated drones are
     /// then errors.
@@ -149,7 +149,8 @@ impl Hostile {
         Ok(())
     }
 
-    /// Rejects a `--kill` of a relay that is off, and a `--boot` of a relay before its first `--kill`.
+    /// Rejects a `--kill` of a relay that an earlier `--kill` has switched off. Also rejects a `--boot` of a relay
+    /// before its first `--kill`.
     ///
     /// A `--boot` of a relay without any `--kill` is allowed: the relay reboots.
     fn in_order(&self) -> Result<(), Failure> {
@@ -330,7 +331,8 @@ impl Air {
         self.deaf.iter().map(name)
     }
 
-    /// Returns the end of each `--deaf` failure (its start if permanent), and the end of a `--soak`.
+    /// Returns the end of each `--deaf` failure, and the end of the run if `--soak` sets it. For a permanent failure,
+    /// its start is returned instead of its end.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
             .iter()
@@ -352,7 +354,7 @@ impl Air {
         Ok(())
     }
 
-    /// Applies the options about links to `setup`, whose frames are lost with the probability `loss`.
+    /// Applies the options about links to `setup`. `loss` is the probability that a frame is lost.
     ///
     /// The setup's wiring must already be set, because the access method depends on it.
     pub fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
@@ -443,7 +445,7 @@ pub struct Flight {
     pub rotation: Rotation,
 }
 
-/// Largest |x|, |y| and height, m, of a drone's start position in the file of `--start`.
+/// Limit on |x|, on |y| and on the height, m, of each start position in the file of `--start`.
 const START_WITHIN_M: f64 = 5_000.0;
 
 impl Flight {

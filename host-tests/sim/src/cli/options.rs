@@ -173,7 +173,8 @@ fn grid_text(grid: uav_relay::Local) -> String {
 }
 
 impl Method {
-    /// Returns true if the method needs a random field of interference. The other methods need an interferer.
+    /// Returns true if the method needs a scenario with a random field: distributions of the interference. The other
+    /// methods need a scenario with an interferer.
     pub const fn is_for_fields(self) -> bool {
         matches!(self, Self::Stochastic | Self::StochasticStep)
     }
@@ -290,7 +291,8 @@ impl Listening {
         Ok(())
     }
 
-    /// Returns `mission` with the interferer's position at the time `then`, if `--move-interferer` is set.
+    /// Returns `mission` with its interferer moved to the position that it has at the time `then`. Without
+    /// `--move-interferer`, returns `mission` unchanged.
     pub fn moved(&self, mission: Mission, then: Instant) -> Mission {
         let (Some([along, aside]), Some(source)) = (self.move_interferer, mission.known_source())
         else {

@@ -43,8 +43,8 @@ pub enum Refused {
     Failed(Failure),
     /// The distance from Tx to Rx is too short for the relays, as the report states.
     ///
-    /// The second value is `Some` for the default scenario: the user cannot change that scenario, so the option
-    /// `--uavs` is reported as wrong.
+    /// For the default scenario there is also a failure, which names the option `--uavs` as wrong, because the user
+    /// cannot change that scenario.
     Reported(Box<ChainReport>, Option<Failure>),
 }
 
@@ -54,7 +54,7 @@ impl From<Failure> for Refused {
     }
 }
 
-/// Number of interference samples that a relay takes at its position in each round of `--closed-loop`.
+/// Number of interference samples that each relay takes in one repetition of a `--closed-loop` run.
 const SAMPLES: u32 = 10_000;
 
 impl<'a> Prepared<'a> {
@@ -143,10 +143,10 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Runs the simulation of `setup` and returns the chain at its end. `watch` runs a chain until its relays no longer
-    /// move.
+    /// Runs the simulation of `setup` and returns the chain at its end. `watch` steps a chain until its run ends.
     ///
-    /// With `--closed-loop`, the relays then measure the interference and agree on positions again, the requested number of times.
+    /// With `--closed-loop`, the relays then measure the interference and agree on positions again. This is repeated as
+    /// often as the option requests.
     ///
     /// # Errors
     /// A setting that a relay rejects, or an error of `watch`.
@@ -182,7 +182,7 @@ impl<'a> Prepared<'a> {
         Ok(chain)
     }
 
-    /// Returns the report of a run. Its SIRs are for the true interference at the end of the run.
+    /// Returns the report of a run. The SIRs in it are computed with the true interference at the run's end.
     ///
     /// The mission in `self.setup` is replaced by a mission with the true interference.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
@@ -204,7 +204,8 @@ impl<'a> Prepared<'a> {
         report
     }
 
-    /// Returns the data traffic of a run. `None` if none is requested, or if the relays have never agreed on positions.
+    /// Returns the data traffic of a run. `None` if the options request no traffic, or if the relays have never agreed
+    /// on positions.
     ///
     /// # Errors
     /// More traffic than can be simulated.
@@ -218,7 +219,8 @@ impl<'a> Prepared<'a> {
         Ok(traffic.map(|traffic| TrafficReport::new(spec, &traffic)))
     }
 
-    /// Returns the report of the replacements in a run, and of the same run without announcements. `None` without a fleet.
+    /// Returns the report of a run in which drones with low batteries are replaced. For comparison it has a second run,
+    /// in which drones do not announce that they leave. `None` without a fleet.
     ///
     /// # Errors
     /// A setting that a relay rejects.
@@ -245,8 +247,8 @@ impl<'a> Prepared<'a> {
 
     /// Returns the linear SIR of every hop from Tx to Rx, for the interferer's position at the time `then`.
     ///
-    /// `places` has the relays' indices (from 1) and positions in the order of the chain. Uploads are ignored: the
-    /// SIRs are for the mission that the relays have at the start.
+    /// `places` has the relays' indices (from 1) and positions in the order of the chain. The SIRs are for the mission
+    /// that the relays have at the start, also after an upload.
     pub fn sirs_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
         let (mission, places) = self.chain_at(then, places);
         report::hop_sirs(&mission, &places)
@@ -264,7 +266,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Returns the mission, and each relay's position, altitude and power, to compute the SIRs of a chain.
+    /// Returns the input for a chain's SIRs: the mission, and each relay's position, altitude and power.
     ///
     /// The mission has the interferer's position at the time `then`.
     fn chain_at(

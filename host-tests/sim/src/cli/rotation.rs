@@ -29,13 +29,14 @@ pub struct Rotation {
 /// Largest relative difference of a battery's capacity from the average.
 const SPREAD: f64 = 0.05;
 
-/// Average speed of a relay that flies a spacing of the chain to its new position, m/s.
+/// Average speed, m/s, of a relay that flies the distance between two relays to its new position.
 ///
-/// No relay flies more than about nine tenths of a spacing, at most 1.5 times as fast as on average: 10 m/s, as fast as the drones are.
+/// A relay flies at most about nine tenths of this distance. Its top speed is at most 1.5 times its own average: 10
+/// m/s, the top speed of the drones.
 const SPACING_MPS: f64 = 7.5;
 
 impl Rotation {
-    /// Replaces the drones of `setup` by a fleet larger than its chain.
+    /// Gives `setup` a fleet of drones with batteries. `--flying` of them are meant to be in the chain.
     pub(super) fn prepare(&self, setup: &mut Setup) -> Result<(), Failure> {
         let config = setup.mission.config();
         let all = config.relays;

@@ -124,13 +124,13 @@ impl Uploads {
         !self.upload.is_empty()
     }
 
-    /// Returns true if relays keep an uploaded mission over a reboot, that is, without `--no-store`.
+    /// Returns true if a relay still has an uploaded mission after a reboot. False with `--no-store`.
     pub fn are_stored(&self) -> bool {
         !self.no_store
     }
 
-    /// Returns the end of the chain whose ground station requests reports, and the start of the requests. `None` if
-    /// no ground station requests reports.
+    /// Returns the end of the chain whose ground station requests reports, and the time when it begins. `None` if no
+    /// ground station requests reports.
     pub fn watches(&self) -> Option<(Side, Instant)> {
         self.watch
             .map(|end| (end.side(), Instant::from_millis(1_000)))
@@ -201,9 +201,9 @@ impl Uploads {
 }
 
 impl Planned {
-    /// Returns the new geographic positions of Tx and Rx; `None` if the upload moves neither.
+    /// Returns the new geographic positions of Tx and Rx; `None` if the upload changes neither position.
     ///
-    /// `sites` are the positions before, `None` if the scenario has no `[site]`.
+    /// `sites` are the positions in the scenario, `None` if the scenario has no `[site]`.
     fn moved(&self, sites: Option<Sites>) -> Result<Option<Sites>, &'static str> {
         let of = |key| {
             let mut changes = self.changes.iter();

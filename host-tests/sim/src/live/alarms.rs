@@ -21,7 +21,7 @@ use crate::simulator::outcome::{Moment, TimelineEvent};
 
 /// Updates the page's alarms from the events of a run.
 pub(super) trait Observe {
-    /// Begins or ends the alarms that the event `moment` concerns.
+    /// Processes the event `moment`: begins the alarms that it causes, and ends those that it resolves.
     fn observe(&mut self, moment: &Moment);
 }
 

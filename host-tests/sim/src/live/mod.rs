@@ -23,9 +23,9 @@ pub struct LiveView {
     axis: Option<Axis>,
     geofence: Option<Geofence>,
     alarms: Alarms,
-    /// Number of log entries of the run that were in earlier snapshots.
+    /// Number of log entries of the run that earlier snapshots have already shown.
     told: usize,
-    /// Newest report of each relay, by its number.
+    /// Newest report of each relay. The key is the relay's number.
     known: BTreeMap<u16, Report>,
 }
 
@@ -41,7 +41,8 @@ impl LiveView {
         }
     }
 
-    /// Returns the state of `chain` at the virtual time `now`, and its log since the last call.
+    /// Returns the state of `chain` at the virtual time `now`. Its log has the entries since the previous call of this
+    /// function.
     pub fn snapshot(&mut self, chain: &Chain, now: Instant) -> Snapshot {
         let new = chain.moments().get(self.told..).unwrap_or_default();
         self.told += new.len();

@@ -13,12 +13,11 @@ use crate::simulator::outcome::{Moment, Outcome, TimelineEvent};
 pub struct AttackCountsReport {
     /// Number of frames that the attacker sent.
     pub sent: u64,
-    /// Number of the attacker's frames that a relay accepted as frames of a neighbour.
+    /// Number of the attacker's frames that a relay mistook for frames of a neighbour and accepted.
     pub taken: u64,
-    /// Number of the attacker's frames by the counter that they incremented at the receiver.
+    /// Number of the attacker's frames for each counter of the receiving relay that the frames incremented.
     ///
-    /// The counters are those of a relay. `received` counts accepted frames. Each of the remaining counters stands for
-    /// a reason of rejection.
+    /// `received` counts accepted frames. Each of the remaining counters stands for a reason of rejection.
     pub counted: BTreeMap<&'static str, u64>,
 }
 
@@ -31,28 +30,29 @@ pub struct AttackReport {
     pub forged: AttackCountsReport,
     /// Numbers of replayed frames: sent, accepted, and counted by the relays.
     pub replayed: AttackCountsReport,
-    /// True if the runs with and without the attack ended for different reasons.
+    /// True if the attack changed the reason for which the run ended.
     pub ended_otherwise: bool,
-    /// Number of relays whose final position or target SIR is not that of the run without the attack.
+    /// Number of relays for which the attack changed the final position or the target SIR.
     pub moved: u64,
     /// Largest distance, in x and altitude, by which the attack moved a relay's final position, m.
     ///
-    /// Absent if a moved relay has no position in one of the two runs.
+    /// Absent if one of the relays in `moved` has no position, either with or without the attack.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest_m: Option<f64>,
-    /// Number of accepted positions whose target SIR does not occur in the run without the attack. Each such position
-    /// shows that the attack misled a relay.
+    /// Number of accepted positions with a target SIR that never occurs in the run without the attack. Each such
+    /// position shows that the attack misled a relay.
     pub misled: u64,
-    /// Number of different views (memberships of the chain) that the relays accepted.
+    /// Number of views that the relays accepted under the attack. A view is an agreed set of the chain's members.
     pub formed: u64,
-    /// Number of different views (memberships of the chain) that the relays accept without the attack.
+    /// Number of views that the relays accepted in the run without the attack. A view is an agreed set of the chain's
+    /// members.
     pub formed_without: u64,
-    /// Number of setpoints outside of the mission's limits. Nonzero is a bug.
+    /// Number of setpoints in the attacked run outside of the mission's limits or the geofence. Nonzero is a bug.
     pub unsafe_setpoints: u64,
 }
 
 impl AttackReport {
-    /// Compares the outcome of a run under attack with `calm`, the outcome without the attack.
+    /// Compares the outcomes of two runs: `outcome` with the attack, and `calm` without it.
     ///
     /// `auth` is true if the relays signed their frames.
     pub fn new(auth: bool, outcome: &Outcome, calm: &Outcome) -> Self {
@@ -143,7 +143,7 @@ impl AttackReport {
     }
 }
 
-/// Returns the target SIRs of all positions that relays accepted, as bit patterns for exact comparison.
+/// Returns the target SIR of each position that a relay accepted. The values are bit patterns for exact comparison.
 fn targets(outcome: &Outcome) -> impl Iterator<Item = u32> {
     let converged = |moment: &&Moment| moment.what == TimelineEvent::Converged;
     let moments = outcome.moments.iter().filter(converged);

@@ -41,7 +41,7 @@ pub struct FaultReport {
 pub struct ChainReport {
     /// Planning method, as on the command line.
     pub method: String,
-    /// Number of relays that the run was requested for.
+    /// Number of relays in the mission of the run, lost relays included.
     pub uavs: u16,
     /// Version of the mission that the chain flies at the end; 0 for the mission loaded before the start.
     ///
@@ -51,15 +51,15 @@ pub struct ChainReport {
     /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Linear SIR of the best possible placement; present only if this SIR is 0.
+    /// Linear SIR of the best possible placement, if it is 0: no placement gives every hop an SIR above 0.
     ///
-    /// Then no placement gives every hop an SIR above 0.
+    /// Absent in all other cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
-    /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
+    /// Linear SIR of the chain's worst hop; absent unless every relay of the chain has a position.
     ///
-    /// If the mission also requires SIRs from Rx to Tx, the hops in that direction count, too. Their SIRs are first
-    /// divided by `reverse`.
+    /// If the mission requires an SIR only from Tx to Rx, these hops count. If it also requires an SIR from Rx to Tx,
+    /// the hops in that direction count, too; their SIRs are first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the worst hop, dB: `sir` as decibels.
@@ -71,29 +71,28 @@ pub struct ChainReport {
     /// Target SIR that the relays agreed on, linear; absent without an agreement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// True if `target` is proven optimal. No chain of relays with equal powers and altitudes can exceed it by more
-    /// than the tolerance.
+    /// True if `target` is proven optimal, false if a chain with a higher SIR may exist.
     ///
-    /// In a random field the leader computes an upper bound on the SIR. If this bound is higher than `target`, the
-    /// optimum is unknown, and the value is false. Absent if there is no random field or no bound.
+    /// Proven means: by the leader's upper bound on the SIR, no chain of relays with equal powers and altitudes exceeds
+    /// `target` by more than the tolerance. Absent unless there is a random field and such a bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
-    /// Linear SIR of the chain before the first round of Algorithm 2, and after each round. In a round of this
-    /// algorithm each relay in turn improves its position.
+    /// Linear SIR of the chain before Algorithm 2, and after each of its rounds. In a round each relay in turn improves
+    /// its position.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<f64>,
-    /// Relays of the chain in order from the transmitter; empty unless every relay has a position.
+    /// Relays that are in the chain at the end, in order from Tx; empty unless each of them has a position.
     pub relays: Vec<RelayReport>,
-    /// Linear SIR of the last hop, at Rx.
+    /// Linear SIR of the hop from the last relay to Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir: Option<f64>,
-    /// SIR of the last hop, at Rx, dB.
+    /// SIR of the hop from the last relay to Rx, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
-    /// Time slots of every hop on which the relays agreed; empty unless the mission has fitted slots.
+    /// Time slots of all hops that the relays have agreed on; empty unless the mission has fitted slots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hop_slots: Vec<HopSlots>,
-    /// Number of passes (messages forwarded along the whole chain) and view proposals that relays started.
+    /// Number of passes (messages forwarded along the whole chain) and view proposals in the run.
     pub sweeps: u32,
     /// Number of frames sent on all links.
     pub messages: u64,
@@ -109,17 +108,18 @@ pub struct ChainReport {
     /// `shared` if all relays share one radio channel; absent for separate links between neighbours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
-    /// Number of relays toward Tx, and toward Rx, that receive a relay's frames; absent for separate links.
+    /// Range of the radios: number of relays on each side that receive a relay's frames. The sides are toward Tx and
+    /// toward Rx. Absent for separate links.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reach: Option<usize>,
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
     /// Availability of the chain, and further statistics. The availability is the fraction of the time in which the
-    /// relays have the best positions.
+    /// relays are at the positions of a run without faults.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
-    /// Replacement of drones with tired batteries; absent without `--fleet`.
+    /// Replacement of drones whose batteries run low; absent without `--fleet`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation: Option<RotationReport>,
     /// Estimate of the interferer and its quality; absent unless the relays locate it by measurements.
@@ -127,7 +127,8 @@ pub struct ChainReport {
     pub listened: Option<SensingReport>,
     /// SIR of the worst hop with all interferers of the scenario.
     ///
-    /// Absent unless the scenario has several interferers, which the relays replace by a single one.
+    /// Absent unless the scenario has several interferers. In their computations, the relays replace them by a single
+    /// interferer.
     #[serde(flatten)]
     pub against_all: Option<AllInterferersReport>,
     /// Number of relays in the chain at the end. Absent if the log, `timeline`, is empty.
@@ -139,10 +140,11 @@ pub struct ChainReport {
     /// Final positions of drones with simulated autopilots; empty if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drones: Vec<DroneReport>,
-    /// Log of the run. It is empty if nothing happened except that relays accepted positions.
+    /// Log of the run. It is empty if relays only accepted positions, or reported that no positions exist.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub timeline: Vec<MomentReport>,
-    /// Times from a failure to the recovery of the chain, for each new view (membership of the chain).
+    /// Times from a failure to the recovery of the chain, one entry for each view that was formed. A view is an agreed
+    /// set of the chain's members.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub recovery: Vec<RecoveryReport>,
     /// Result of the attack; absent without an attacker.
@@ -373,11 +375,10 @@ impl ChainReport {
     }
 }
 
-/// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
+/// Returns the relays in the chain at the end of a run, in order from Tx, with their numbers from 1.
 ///
-/// The chain is the largest view that all its relays have accepted. If there is no such view, the result has all relays
-/// that are switched on. If relays on separate links have failed, the result has all relays. It is empty if no part of
-/// the chain has a quorum.
+/// The chain is the largest view (agreed set of members) that all its relays have accepted. Without such a view, it is
+/// all relays that are switched on. After a failure on separate links, all relays are returned; without a quorum, none.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -400,14 +401,15 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if `part` contains all relays of one view, in the order of their indices.
+/// Returns true if `part` is a complete view: all its relays, sorted by their indices in the view.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)
         .all(|(place, (_, relay))| relay.index == place && usize::from(relay.relays) == part.len())
 }
 
-/// Returns a report about each relay that has left the chain. `left` lists the relays that remain in it.
+/// Returns a report about each relay that is not in the chain at the end. `left` lists the relays that are still in the
+/// chain.
 pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostReport> {
     (1..)
         .zip(&outcome.relays)
@@ -438,16 +440,16 @@ pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
         .unwrap_or(setup.mission)
 }
 
-/// Returns the version of the mission that the chain flies at the end. If the relays' versions differ, returns the
-/// newest version.
+/// Returns the version of the mission that the chain flies at the end. If the relays' versions differ, the newest of
+/// them is returned.
 pub(super) fn version(outcome: &Outcome) -> u16 {
     let chain = left(outcome);
     let versions = chain.iter().map(|(_, relay)| relay.version);
     versions.max().unwrap_or(0)
 }
 
-/// Returns the error line of a failed run; `None` after success. The line also states if an uploaded mission was not
-/// adopted.
+/// Returns the error line of a failed run; `None` after success. If no relay has adopted the newest uploaded mission,
+/// the line states this, too.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
     // A mission counts as adopted even if its relays are lost.
@@ -537,7 +539,7 @@ impl AirReport {
     }
 }
 
-/// Availability of the chain over a whole run. All fields are absent unless the run records them.
+/// Availability of the chain over a whole run. All fields are absent if the run has no such statistics.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct AvailabilityReport {
     /// Time when all relays of the chain first had agreed positions, s of virtual time.
@@ -545,14 +547,15 @@ pub struct AvailabilityReport {
     pub first_agreement_s: Option<f64>,
     /// Fraction of the time since the first agreement in which the chain was available.
     ///
-    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
-    /// without faults.
+    /// The chain is available while the longest chain that living relays can form is at the positions that this chain
+    /// reaches in a run without faults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub availability: Option<f64>,
     /// Longest outage since the first agreement, s: a time in which the chain was not available. See `availability`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_outage_s: Option<f64>,
-    /// Largest number of groups of relays that flew at the same time, each by its own agreement.
+    /// Largest number of groups of relays that flew at the same time, each on an agreement of its own. More than 1
+    /// means that the chain was split.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_flying: Option<usize>,
     /// Smallest distance of two relays during the run, m.
@@ -614,7 +617,7 @@ pub struct DroneReport {
     pub h_m: f64,
     /// True if the relay, not the pilot, controls the drone.
     pub flown: bool,
-    /// Distance of the drone from the relay's setpoint, m; absent without a setpoint.
+    /// Distance of the drone from its relay's setpoint, m; absent if the relay has no setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
 }
@@ -681,8 +684,8 @@ pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     reports.collect()
 }
 
-/// SIR with all interferers of the scenario. The relays replace these interferers by a single one in their
-/// computation.
+/// SIR with all interferers of the scenario. In their computations, the relays replace all of them by a single
+/// interferer.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct AllInterferersReport {
     /// Linear SIR of the worst hop with all interferers of the scenario.

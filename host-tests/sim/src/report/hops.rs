@@ -7,10 +7,10 @@ use uav_relay::optimiser::pass::Walk;
 use uav_relay::{Mission, Placement, Profile, SlotShares};
 pub use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
 
-/// Returns the position of relay `index` for the target SIR `target`, linear.
+/// Returns the position that relay `index` takes if the chain meets the target SIR `target`, linear.
 ///
-/// A relay stops before its farthest x if later relays of the pass can meet the target only then. `None` if the chain
-/// cannot meet it. `profile_of` returns the profile of relay 1..=N.
+/// This is the relay's farthest x in the direction of the pass, or an x before it if the relays after it in the pass
+/// can meet the target only then. `None` if the chain cannot meet it. `profile_of` returns the profile of relay 1..=N.
 pub fn place(
     mission: &Mission,
     target: f32,
@@ -67,11 +67,10 @@ pub struct HopSlots {
 }
 
 impl HopSlots {
-    /// Returns the slots of all hops from the times that the hops need for their data. `there` has the times for data
-    /// toward Rx, `back` the times for data toward Tx.
+    /// Computes the time slots of all hops. Each slot is proportional to the time that the hop's data needs.
     ///
-    /// `back` is empty if there are only data toward Rx. The result is empty if a time is infinite, because the hop
-    /// then carries no data.
+    /// `there` has the times for data toward Rx, `back` those for data toward Tx; `back` is empty if there are only
+    /// data toward Rx. The result is empty if a time is infinite, because the hop then carries no data.
     pub fn of(there: &[f64], back: &[f64]) -> Vec<Self> {
         let frame: f64 = there.iter().chain(back.iter().rev()).sum();
         let mut spent = 0.0;
@@ -92,7 +91,8 @@ impl HopSlots {
         .collect()
     }
 
-    /// Returns the time slots of all hops from the slots on which the relays have agreed. `relays` begins with relay 1.
+    /// Collects the time slots of all hops from the slots that the relays have agreed on. `relays` has the slots of
+    /// each relay in order, relay 1 first.
     pub fn agreed(relays: &[SlotShares]) -> Vec<Self> {
         let last = relays.last().map(|last| (last.to_rx, last.from_rx));
         let hops = relays.iter().map(|own| (own.from_tx, own.to_tx));
@@ -150,15 +150,15 @@ pub struct LostReport {
     pub version: Option<u16>,
     /// Reason why the relay is not in the chain.
     ///
-    /// `silent`: the relay is off. `apart`: the relay is on, but cannot reach the relays of the chain. `no quorum`: the
-    /// relay is on, but no chain is left.
+    /// `silent`: the relay is off. `apart`: the relay is on, but not in one view with the chain's relays. `no quorum`:
+    /// the relay is on, but too few relays receive each other to form a chain.
     pub why: &'static str,
 }
 
 /// SIR of the worst hop in the direction from Rx to Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WorstBack {
-    /// SIR that hops need from Rx to Tx, as a fraction of the SIR needed from Tx to Rx (`link.reverse`).
+    /// Required ratio of SIRs: hops toward Tx need `reverse` times the SIR that hops toward Rx need.
     pub reverse: f64,
     /// Linear SIR of the worst hop from Rx to Tx.
     pub worst_back: f64,
@@ -166,7 +166,7 @@ pub struct WorstBack {
     pub worst_back_db: f64,
     /// Linear SIR of the hop from Rx to the last relay.
     pub rx_sir_back: f64,
-    /// Linear SIR of the worst hop toward Rx or Tx; SIRs from Rx to Tx are divided by `reverse`.
+    /// Linear SIR of the worst hop in both directions. SIRs of hops toward Tx are first divided by `reverse`.
     pub worst_both: f64,
     /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. SIRs from Rx to Tx are
     /// divided by `reverse` before they are compared.
@@ -174,7 +174,8 @@ pub struct WorstBack {
 }
 
 impl WorstBack {
-    /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
+    /// Finds the worst hop in each direction. `there` has the linear SIRs of the hops toward Rx, `back` those of the
+    /// hops toward Tx.
     ///
     /// `None` if the mission requires no SIR from Rx to Tx, or if there are no hops.
     pub fn of(mission: &Mission, there: &[f64], back: &[f64]) -> Option<Self> {
@@ -186,10 +187,10 @@ impl WorstBack {
         }
     }
 
-    /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
+    /// Finds the worst hop in each direction. `there` has the linear SIRs of the hops toward Rx, `back` those of the
+    /// hops toward Tx.
     ///
-    /// `reverse` is the SIR that hops to Tx need, as a fraction of the SIR that hops to Rx need. `None` if there are no
-    /// hops.
+    /// Hops toward Tx need `reverse` times the SIR that hops toward Rx need. `None` if there are no hops.
     pub fn with(reverse: f64, there: &[f64], back: &[f64]) -> Option<Self> {
         let worst = |sirs: &[f64]| sirs.iter().copied().reduce(f64::min);
         let (worst_there, worst_back) = (worst(there)?, worst(back)?);
@@ -221,7 +222,8 @@ pub const fn direction(there: f64, back: f64) -> &'static str {
     }
 }
 
-/// Reports relays, numbered from 1, with their positions and the linear SIRs at which they receive.
+/// Creates a report of each relay, numbered from 1, with its position and received SIR. `sirs` has the linear SIR at
+/// which each relay receives the previous node.
 pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
     (1..)
         .zip(places.iter().zip(sirs))
@@ -238,10 +240,10 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
         .collect()
 }
 
-/// Formats the relays of the chain, lost relays and Rx as a table. If `room` is true, it has a y column.
+/// Formats a table of the chain's relays, lost relays, and Rx. If `room` is true, it has a column for y.
 ///
-/// If `rx_sir_back` is given, it also has the SIRs from Rx to Tx. The row of a relay then has the SIR at which the
-/// previous node receives this relay.
+/// If `rx_sir_back` is given, the table has columns for the hops toward Tx. The row of a relay then has the SIR at
+/// which the previous node, nearer to Tx, receives this relay.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

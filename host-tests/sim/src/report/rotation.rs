@@ -1,4 +1,4 @@
-//! Report of a run in which drones with tired batteries are replaced.
+//! Report of a run in which drones are replaced when their batteries run low.
 
 use std::fmt::Write as _;
 
@@ -7,16 +7,18 @@ use serde::Serialize;
 use super::timeline::seconds;
 use crate::simulator::rotation::{GOOD, NearDrone, RESERVE_S, Rotated, RotationSpec};
 
-/// Result of a run in which drones with tired batteries are replaced.
+/// Result of a run in which drones are replaced when their batteries run low.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RotationReport {
     /// Number of drones that are meant to fly.
     pub flying: u16,
-    /// Figures of the run in which a tired drone announces that it leaves. A replacement then joins first.
+    /// Figures of the run in which a drone with a low battery announces that it will leave the chain. A replacement
+    /// joins the chain before the drone leaves.
     pub announced: RotationFigures,
-    /// Figures of the run without announcements; absent if this run was not made.
+    /// Figures of the same run without announcements; absent if this run was not made.
     ///
-    /// A tired drone flies home with its relay off, so that the chain loses it. At this moment a spare is switched on.
+    /// A drone with a low battery then flies home and switches its relay off, so that the chain loses the relay. At the
+    /// same time a spare is switched on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unannounced: Option<RotationFigures>,
 }
@@ -24,34 +26,35 @@ pub struct RotationReport {
 /// Figures of one run with replacements.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RotationFigures {
-    /// Time when the chain was first complete, s.
+    /// Time when all drones that are meant to fly were first in the chain and in place, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub complete_at_s: Option<f64>,
-    /// Time from `complete_at_s` to the end of the run, s.
+    /// Duration of the statistics, s: from `complete_at_s` to the end of the run.
     pub watched_s: f64,
-    /// Fraction of `watched_s` in which the worst hop's SIR was below 0.99 of the optimum.
+    /// Fraction of `watched_s` in which the SIR of the worst hop was below 99 % of the best possible SIR.
     pub below: f64,
-    /// Smallest SIR of the worst hop, as a fraction of the optimum, since the chain was complete.
+    /// Smallest SIR of the worst hop since `complete_at_s`, as a fraction of the best possible SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst: Option<f64>,
     /// Virtual time of the smallest SIR, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_at_s: Option<f64>,
-    /// Number of relays that left since the chain was complete.
+    /// Number of relays that left the chain since `complete_at_s`.
     pub replaced: u32,
-    /// Number of relays, among `replaced`, that left without permission.
+    /// Number of relays, among `replaced`, that had to leave before the chain permitted it.
     pub forced: u32,
-    /// Number of relays that left per hour.
+    /// Number of relays that left the chain per hour since `complete_at_s`.
     pub per_hour: f64,
-    /// Number of relays that would leave per hour if each used its battery as far as allowed.
+    /// Number of relays per hour that would leave if each stayed as long as its battery allows.
     ///
-    /// A battery may be used until only the reserve and the way home remain.
+    /// A relay may stay until its battery has just enough for the way home and the reserve.
     pub arithmetic_per_hour: f64,
     /// Mean time from a relay's request to leave until it left, s.
     pub mean_wait_s: f64,
     /// Longest time from a relay's request to leave until it left, s.
     pub longest_wait_s: f64,
-    /// Least remaining endurance beyond the way home, s, of a drone when it left the chain.
+    /// Smallest endurance, s, that was expected to remain at home, over all drones that left the chain. It is computed
+    /// when a drone leaves: the remaining endurance less the time of the flight home.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_left_s: Option<f64>,
     /// Smallest true distance of two drones in the air, m. Drones flown by their pilots count, too.
@@ -60,10 +63,11 @@ pub struct RotationFigures {
     /// Time of the closest approach, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest_at_s: Option<f64>,
-    /// The two drones that were nearest to each other, at the time `nearest_at_s`.
+    /// The two drones of the closest approach, with their states at the time `nearest_at_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest: Option<[NearDrone; 2]>,
-    /// Largest number of chains that flew at the same time, each by its own agreement.
+    /// Largest number of chains that flew at the same time, each on an agreement of its own. More than 1 means that the
+    /// chain was split.
     pub chains: usize,
 }
 
@@ -95,10 +99,10 @@ impl RotationFigures {
 }
 
 impl RotationReport {
-    /// Creates the report from one run with announced departures and one without.
+    /// Creates the report from two runs: with and without announced departures.
     ///
-    /// The second value of each pair is the largest number of chains that flew at the same time, each by its own
-    /// agreement.
+    /// The second value of each pair is the largest number of chains that flew at the same time, each on an agreement
+    /// of its own.
     pub fn new(
         spec: &RotationSpec,
         announced: (&Rotated, usize),
@@ -112,7 +116,7 @@ impl RotationReport {
         }
     }
 
-    /// Formats the figures as a table: announced departures and ordinary losses side by side.
+    /// Formats the figures as a table with two columns: announced and unannounced departures.
     pub fn table(&self) -> String {
         let mut text = format!(
             "\nreplacement of tired drones, {} of the fleet flying{:>17}{:>14}\n",

@@ -27,18 +27,19 @@ pub struct BelievedReport {
     pub y_m: f32,
 }
 
-/// Quality of the relays' interference estimate, and of the positions chosen by it.
+/// Quality of the relays' interference estimate, and of the positions chosen with this estimate.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct SensingReport {
     /// Interferer as relay 1 estimates it at the end of the run; absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed: Option<BelievedReport>,
-    /// Number of times that the relays agreed on new positions, including the first.
+    /// Number of agreements on positions in the run; the first agreement is included.
     pub agreements: u32,
     /// Linear SIR of the worst hop at the end, with the true interferers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub true_sir: Option<f64>,
-    /// Linear SIR that the relays reach if they know the interferer; only for a single interferer.
+    /// Linear SIR that the relays would reach if they knew the interferer. Absent if the scenario has several
+    /// interferers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimum_sir: Option<f64>,
     /// Ratio of `true_sir`, the SIR at the end, to `optimum_sir`, the SIR with a known interferer.
@@ -130,7 +131,7 @@ fn moves(true_interference: &TrueInterference) -> bool {
         .any(|speed| speed.abs() > 0.0)
 }
 
-/// Returns the scene reduced to the relays with the numbers `nodes`, from 1.
+/// Returns `scene` with only the relays whose numbers (from 1) are in `nodes`.
 fn with_relays(scene: Scene, nodes: &[u16]) -> Scene {
     let relay = |node: &u16| {
         scene
@@ -142,9 +143,9 @@ fn with_relays(scene: Scene, nodes: &[u16]) -> Scene {
     Scene { relays, ..scene }
 }
 
-/// Returns the linear SIR that the relays `nodes` reach in a separate run if they know the interferer.
+/// Simulates a chain of the relays `nodes` that know the interferer; returns the linear SIR they reach.
 ///
-/// `None` unless the scene has exactly one interferer, or if that run fails.
+/// `None` unless the scene has exactly one interferer, or if this simulation fails.
 fn optimum(setup: &Setup, scene: &Scene, nodes: &[u16]) -> Option<f64> {
     let [source] = scene.sources.as_slice() else {
         return None;

@@ -107,7 +107,8 @@ impl MomentReport {
     }
 }
 
-/// Converts the log of a run to report entries; empty if the only events are accepted positions.
+/// Converts the log of a run to report entries. The result is empty if the log has only accepted positions and results
+/// that no positions exist.
 pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
     let plain = |moment: &Moment| {
         matches!(
@@ -392,11 +393,14 @@ pub struct RecoveryReport {
     pub view: u32,
     /// Number of relays in the view (membership of the chain).
     pub relays: u16,
-    /// Relays of the previous view (membership of the chain) that are not in this view, by number from 1.
+    /// Numbers (from 1) of relays that were in the previous view, and are not in this one. A view is an agreed set of
+    /// the chain's members.
     pub lost: Vec<u16>,
-    /// Relays in this view (membership of the chain) that were not in the previous view, by number from 1.
+    /// Numbers (from 1) of relays that are in this view, and were not in the previous one. A view is an agreed set of
+    /// the chain's members.
     pub back: Vec<u16>,
-    /// Version of an uploaded mission that the chain first flies in this view. Absent if there is no such mission.
+    /// Version of the uploaded mission that the chain begins to fly with this view. Absent if the view brings no newly
+    /// uploaded mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Time when the upload of the mission `version` began, s; absent without an upload.
@@ -404,18 +408,19 @@ pub struct RecoveryReport {
     pub offered_s: Option<f64>,
     /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
     ///
-    /// If there are several such events, it is the time of the first one that concerns a lost or a returned relay.
+    /// If there are several such events, it is the time of the first event that explains the loss or return of a relay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
-    /// Time when a neighbour first detected that a relay was lost or had returned, s.
+    /// Time when a relay first detected that a neighbour was lost or had returned, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detected_s: Option<f64>,
     /// Time when the last relay of the view (membership of the chain) accepted it, s.
     pub formed_s: f64,
-    /// Time when all relays of the view had new positions, s; absent if a newer view came earlier.
+    /// Time when all relays of the view had new positions, s. Absent if the next view was formed before that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged_s: Option<f64>,
-    /// Number of passes and view proposals from the detection, or from the upload, to convergence.
+    /// Number of passes and view proposals up to the agreement on positions (`converged_s`). Counted from the detection
+    /// (`detected_s`), or without it from the upload (`offered_s`).
     ///
     /// A pass is a message that relays forward along the whole chain.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -426,7 +431,7 @@ pub struct RecoveryReport {
 struct View {
     number: u32,
     members: BTreeSet<u16>,
-    /// Indices of two log entries: the first and the last acceptance of the view by a relay.
+    /// Indices of two log entries: the first and the last one in which a relay accepts the view.
     span: (usize, usize),
 }
 
@@ -514,8 +519,8 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
 
 /// Returns the time of the event that caused the loss of the relays `lost` and the return of `back`.
 ///
-/// For each of these relays, the cause is the latest suitable event in `earlier`, such as a failure or the end of a
-/// partition. The earliest of these causes is returned.
+/// For each of these relays, the cause is the latest event in `earlier` that explains its loss or return, such as a
+/// failure or the end of a partition. The earliest cause is returned.
 fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {
@@ -533,9 +538,9 @@ fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant>
     gone.into_iter().chain(come).min()
 }
 
-/// Returns the first log entry in which a relay detects that a relay was lost or has returned.
+/// Returns the first log entry in which a relay detects the loss or return of one of the given relays.
 ///
-/// `lost` and `back` are the numbers of lost and returned relays.
+/// `lost` and `back` are the numbers of the lost and the returned relays.
 fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
     earlier.iter().find(|moment| match moment.what {
         TimelineEvent::Lost(_) => moment.other.is_some_and(|other| lost.contains(&other)),
@@ -546,7 +551,8 @@ fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'
     })
 }
 
-/// Returns the last entry of `later`, a part of the log, in which one of `members` accepts a position.
+/// Returns the last entry of `later` in which one of `members` accepts a position. `later` is the part of the log after
+/// the view was accepted.
 ///
 /// `None` unless every member accepts a position.
 fn convergence<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
@@ -578,7 +584,8 @@ fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant))
         .sum()
 }
 
-/// Formats a line for each view with lost or returned relays or a new mission. All further views are only counted.
+/// Formats a line for each view with lost or returned relays, or with a newly uploaded mission. For all remaining views
+/// together it adds one line with their number.
 pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
     let mut text = String::new();
     let mut same = 0;
@@ -653,7 +660,7 @@ mod tests {
     use super::{Moment, TimelineEvent, line};
     use uav_relay::Instant;
 
-    /// Checks that the lines about a departure name the relay that may leave.
+    /// Checks that log lines about a relay's departure from the chain name the relay that may leave.
     #[test]
     fn lines_of_a_departure_name_the_relay_that_leaves() {
         let of = |relay, what, other| {

@@ -7,17 +7,18 @@ use serde::Serialize;
 use crate::simulator::route::{ChainState, Period, Ps, SECOND};
 use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec, quantile_s};
 
-/// Number of periods at the start, and also at the end, that a shortened text lists.
+/// Number of periods that a shortened text lists at its start, and again at its end.
 const ENDS: usize = 10;
 
-/// Largest number of queues that the text lists completely. If there are more, it lists the 8 longest.
+/// Largest number of queues that the text lists completely. If there are more queues, it lists only the 8 queues with
+/// the largest mean length.
 const SHOWN: usize = 16;
 
 /// Data traffic of a run. Each array has one value for the direction to Rx and, if data goes both ways, a second
 /// value for the direction to Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficReport {
-    /// Data rates, bit/s, for each direction, that the planner's formula gives at the first agreement.
+    /// Promised data rates, bit/s, for each direction: computed for the positions of the first agreement.
     pub promised_bps: Vec<f64>,
     /// Data rates of the packets that the sources created, bit/s, for each direction.
     pub offered_bps: Vec<f64>,
@@ -40,12 +41,12 @@ pub struct TrafficDetails {
     pub queue_packets: usize,
     /// Start of the traffic, s of virtual time.
     pub from_s: f64,
-    /// End of the traffic in the direction that ends last, s of virtual time.
+    /// End of the traffic, s of virtual time. If data goes both ways, the later of the two ends.
     pub until_s: f64,
     /// Traffic in each direction: to Rx and, if data goes both ways, back to Tx.
     pub flows: Vec<FlowReport>,
-    /// Periods in which the chain's view, its state and the promised data rates are constant. The promised rates come
-    /// from the planner's formula.
+    /// Periods of the run, in each of which the chain does not change. In a period, the view (set of members), the
+    /// state, and the promised data rates are constant.
     pub periods: Vec<PeriodReport>,
     /// Text about how the hops share frequencies and time.
     #[serde(skip)]
@@ -109,15 +110,16 @@ pub struct PeriodReport {
     pub relays: u16,
     /// State of the chain: `agreed`, `pending` or `broken`.
     ///
-    /// `agreed`: the relays are at agreed positions. `pending`: there is no agreement yet, or drones are on their
-    /// way. `broken`: a relay is missing.
+    /// `agreed`: the relays are at agreed positions. `pending`: the relays have no agreement yet, or drones are on
+    /// their way. `broken`: a relay of the view is silent, has no position, or has not accepted the view.
     pub state: &'static str,
     /// Data rates at the agreed positions, bit/s, for each direction; absent unless the state is `agreed`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub promised_bps: Vec<f64>,
     /// Data rates of the packets that arrived in this period, bit/s, for each direction.
     pub delivered_bps: Vec<f64>,
-    /// Number of packets dropped or lost in this period, for each direction.
+    /// Number of packets in this period that were dropped by full queues or lost, for each direction. Packets are lost
+    /// in the queues of relays that go silent.
     pub missing_packets: Vec<u64>,
     /// Median delays of the packets that arrived in this period, s, for each direction.
     ///

@@ -44,9 +44,10 @@ pub enum AttackKind {
 /// Counts of the attacker's frames by how the receiving relays classified them.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct AttackCounts {
-    /// Number of frames by kind, and by the counter in [`Stats`] that a frame incremented at its receiver.
+    /// Number of the attacker's frames, by kind and by the counter in [`Stats`] that a frame incremented.
     ///
-    /// The counter `received` means that the receiver accepted the frame as a frame of a neighbour.
+    /// The counter is one of the receiving relay. The counter `received` counts accepted frames, which the relay
+    /// mistook for frames of a neighbour.
     pub counted: BTreeMap<(AttackKind, &'static str), u64>,
 }
 
@@ -89,7 +90,8 @@ impl Attacker {
 
     /// Draws the time and the kind of every frame of the attack; the list is not sorted by time.
     ///
-    /// Frames that are sent back to back are spaced by the time that the longest message takes on `link`.
+    /// Frames that are sent back to back have intervals equal to the time that `link` needs for a message of maximum
+    /// length.
     pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, AttackKind)> {
         let Attack {
             forged,
@@ -138,9 +140,10 @@ impl Attacker {
     }
 }
 
-/// Returns the name of the first counter that a frame has increased from `before` to `after`.
+/// Returns the name of the counter that a frame has increased from `before` to `after`.
 ///
-/// This counter shows how the receiver classified the frame.
+/// This counter shows how the receiver classified the frame. If the frame has increased two counters, the result is the
+/// reason of the rejection.
 pub(super) fn incremented_counter(before: &Stats, after: &Stats) -> &'static str {
     type Counter = (&'static str, fn(&Stats) -> u32);
     // A received but rejected frame increments two counters; the reason for the rejection comes first.
@@ -186,8 +189,8 @@ pub(super) struct ForgedRoute {
 
 /// Returns a frame forged by a random method. `heard` is a recorded frame, if any.
 ///
-/// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a valid
-/// CRC, handshake with a guessed tag, handshake of a relay with a wrong key.
+/// Methods: false message without a tag; false message with a random tag; recorded frame with one changed byte and a
+/// valid CRC; handshake with a random tag; handshake signed with a wrong key.
 pub(super) fn forge(
     mission: &Mission,
     way: ForgedRoute,
@@ -237,9 +240,10 @@ fn false_message(
     copy.unwrap_or_else(|| random_message(mission, way, rng))
 }
 
-/// Returns a copy of a recorded frame with false values. The pass number of the copy is the same or slightly higher.
+/// Returns a recorded message with changed values, as a new frame. The message keeps its pass number or gets a slightly
+/// higher one.
 ///
-/// `None` unless the frame is a message that relays pass along the whole chain, or a reply to one.
+/// `None` unless the message is one of a pass along the chain (a sweep or relay profiles), or a reply to it.
 fn altered_copy(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let whole = with_check(plain);
     let (header, message) = frame::decode(&whole).ok()?;
@@ -278,7 +282,7 @@ fn altered_copy(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     Some(frame.get(..len)?.to_vec())
 }
 
-/// Returns a frame with a false message that the attacker makes up without a recorded frame.
+/// Returns a frame with an invented message of a random kind. No recorded frame is needed.
 fn random_message(mission: &Mission, way: ForgedRoute, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
     let mission_id = MissionId { version: 0, digest };

@@ -80,7 +80,7 @@ impl Chain {
         self.update_statistics(changed);
     }
 
-    /// Gives `samples` interference samples to every living relay that has a setpoint.
+    /// Gives `samples` interference samples to every relay that is switched on and has a setpoint.
     ///
     /// `draw` returns a random sample, W, at a position.
     pub fn measure(
@@ -113,7 +113,7 @@ impl Chain {
             .collect()
     }
 
-    /// Makes the leader compute the relays' positions again, with the measurements made so far.
+    /// Makes the leader plan the relays' positions again, with all measurements made so far.
     pub fn restart(&mut self) {
         let now = self.now;
         self.accepted_positions = 0;
@@ -328,25 +328,26 @@ struct Member {
     relay: Relay,
     /// Number of the relay in the mission, from 1.
     node: u16,
-    /// Outgoing serial lines: the first toward Tx or to a shared channel, the second toward Rx.
+    /// Outgoing serial lines of the relay. Line 0 leads toward Tx, or to all relays on an ideal shared channel; line 1
+    /// leads toward Rx.
     lines: [Line; 2],
     killed: Option<Instant>,
     /// True if the relay controlled its drone at the previous time step of the flight.
     under_relay_control: bool,
     starts: u32,
-    /// Number of passes and view proposals that the relay began before its last start.
+    /// Number of passes and view proposals of the relay before it was last switched on.
     ///
     /// A pass is a message that relays forward along the whole chain.
     swept: u32,
     stored: Option<Upload>,
     /// Stored record of the relay's votes on views, which survives a reboot; `None` before its first vote.
     record: Option<ViewRecord>,
-    /// Last setpoint that [`Chain::check`] found within the limits, so that it is not checked again.
+    /// Latest setpoint that [`Chain::check`] has found to be within the limits. The same setpoint is not checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of all setpoints since the relay last had none. If the relay has a guard, a
-    /// setpoint may be outside of the geofence only within this range.
+    /// Smallest and largest coordinates of all setpoints since the relay last had no setpoint. If the relay has a
+    /// guard, its setpoints may be outside of the geofence only within these bounds.
     setpoint_bounds: Option<[Placement; 2]>,
-    /// Position at which the relay last measured the interference.
+    /// Position of the relay's latest measurement of the interference; `None` before the first one.
     measured: Option<Placement>,
     /// State last recorded for the animation: true if the relay was on, and its setpoint.
     filmed: Option<(bool, Option<Placement>)>,
@@ -364,7 +365,7 @@ pub struct Chain {
     outcome: Outcome,
     now: Instant,
     events: u64,
-    /// Number of positions that relays have accepted since the start, or since planning was restarted.
+    /// Number of positions that relays have accepted since the start, or since the last [`Chain::restart`].
     accepted_positions: usize,
     /// Number of planned events in the queue, such as failures, reboots, uploads and attacker frames.
     ///
@@ -375,13 +376,13 @@ pub struct Chain {
     flight: Option<Flight>,
     fleet: Vec<Vehicle>,
     rotation: Option<Rotation>,
-    /// Index (from 0) of each drone that takes off at the present step, and its place on the ground.
+    /// Index (from 0) of each drone that takes off at the present step, and its position on the ground.
     take_off_from: Vec<(usize, Point)>,
-    /// Distance of each pair of drones when both were last handed over to their relays, m.
+    /// Distance of each pair of drones, m, at the time from which both drones were under automatic control.
     ///
-    /// `None` while one of them is on the ground, takes off, lands or is flown by its pilot.
+    /// `None` while one of the two drones is on the ground, takes off, lands or is flown by its pilot.
     handed_over_m: Vec<Option<f64>>,
-    /// Simulated shared channel; `None` for separate lines or an ideal channel.
+    /// Simulated half-duplex channel that all relays share; `None` for separate lines or an ideal channel.
     medium: Option<Medium>,
     bursts: Option<Bursts>,
     /// Setpoints of all relays at the last agreement; `None` until the chain has agreed.
@@ -389,7 +390,7 @@ pub struct Chain {
     agreements: u32,
     /// True once the relays have made the last measurement of the interference.
     measurements_done: bool,
-    /// Statistics of the availability; `None` unless the run has a fixed end or a shared channel.
+    /// Statistics of the chain's availability; `None` unless the run has a set end or a shared channel.
     watch: Option<Watch>,
     record: Option<Record>,
 }
@@ -404,9 +405,9 @@ struct Start {
     now: Instant,
 }
 
-/// Creates a relay that is switched on, and restores what it stored before: `stored` and `record`.
+/// Creates a relay that is switched on, and restores what it stored before it was switched off.
 ///
-/// `stored` is an uploaded mission, `record` the record of its votes on views.
+/// `stored` is an uploaded mission, `record` the record of the relay's votes on views.
 fn switched_on(
     setup: &Setup,
     start: Start,
@@ -450,7 +451,7 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a fault-free chain, whose positions are the reference for the statistics.
+    /// `run` simulates chains without faults. Their positions are the reference for the statistics of this run.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -647,11 +648,11 @@ pub enum QueuedEvent {
     Kill,
     /// The relay is switched on again.
     Boot,
-    /// The relay requests to leave the chain. The field is its drone's remaining endurance, s, if known.
+    /// The relay requests to leave the chain. The value is the remaining endurance of its drone, s, if known.
     Leave(Option<u16>),
-    /// The relay is told its drone's remaining endurance beyond the way home, s.
+    /// The relay receives the remaining endurance of its drone, s. The time for the flight home is subtracted.
     Endurance(u16),
-    /// The relay cancels its departure.
+    /// The relay withdraws its request to leave the chain, or joins the chain if it is a spare.
     Stay,
     /// A partition or a one-way link failure begins or ends.
     Partition,

@@ -114,7 +114,7 @@ impl Body {
         sum(self.at, braked)
     }
 
-    /// Moves the body toward `goal` for `step_s` seconds, with at most this speed and acceleration.
+    /// Moves the body toward `goal` for `step_s` seconds. `speed_mps` and `acceleration_mps2` are the limits per axis.
     pub fn fly(&mut self, goal: Point, speed_mps: f64, acceleration_mps2: f64, step_s: f64) {
         let axes = self.at.iter_mut().zip(&mut self.velocity_mps);
         for ((at, velocity), goal) in axes.zip(goal) {
@@ -188,7 +188,7 @@ pub(super) struct Drone {
 }
 
 impl Drone {
-    /// Moves the drone toward its goal for `step_s` seconds. The drone navigates by its own position estimate.
+    /// Moves the drone toward `goal` for `step_s` seconds. The drone navigates by its own position estimate.
     pub(super) fn fly(&mut self, step_s: f64) {
         let goal = sum(self.goal, self.bias.map(|part| -part));
         self.body
@@ -215,7 +215,7 @@ impl Drone {
         self.body = Body::hovering(at);
     }
 
-    /// Returns the drone's own position estimate: the true position plus the bias.
+    /// Returns the drone's own position estimate: the true position plus the drone's constant error.
     pub(super) fn estimated_position(&self) -> Point {
         sum(self.body.at, self.bias)
     }
@@ -249,7 +249,7 @@ impl Flight {
         }
     }
 
-    /// Moves all drones for one time step. Returns true if the drones report their positions after this step.
+    /// Moves all drones for one time step. Returns true if a position report of the drones is due after this step.
     pub(super) fn go_on(&mut self) -> bool {
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
         let step_s = self.step.as_micros() as f64 / 1e6;
@@ -260,7 +260,8 @@ impl Flight {
         self.steps.is_multiple_of(self.report_steps.max(1))
     }
 
-    /// Returns the position that drone `index` (from 0) reports, m: the true position plus bias and noise.
+    /// Returns the position that drone `index` (from 0) reports, m. It is the true position plus a constant and a
+    /// random error.
     ///
     /// `None` if there is no such drone.
     pub(super) fn reported(&mut self, index: usize) -> Option<Point> {

@@ -38,7 +38,7 @@ pub struct Injected {
 pub struct Arrival {
     /// Bytes of the frame as received, with changes by faults.
     pub bytes: Vec<u8>,
-    /// Delay of the frame by simulated faults. The unit is the longest time that a message needs for one hop.
+    /// Delay of the frame by simulated faults, as a multiple of [`LinkSpec::hop_time`].
     pub late: u64,
 }
 
@@ -108,8 +108,7 @@ impl Faults {
 /// In the bad state the link loses all frames, in the good state no frames.
 #[derive(Debug)]
 pub struct Bursts {
-    /// Mean fraction of frames that the link loses, 0 to 1. This is also the fraction of frames that find the link in
-    /// its bad state.
+    /// Mean fraction of frames that the link loses, 0 to 1. It is equal to the probability of the bad state.
     share: f64,
     /// Probability that a link in the good state is in the bad state for the next frame.
     worsens: f64,
@@ -170,7 +169,7 @@ pub struct OneWayFailure {
 }
 
 impl OneWayFailure {
-    /// Returns true if this failure keeps relay `by` from receiving relay `of` at the time `now`.
+    /// Returns true if this failure prevents relay `by` from receiving relay `of` at the time `now`.
     pub fn applies(&self, by: u16, of: u16, now: Instant) -> bool {
         (self.by, self.of) == (by, of)
             && now >= self.from
@@ -204,7 +203,8 @@ impl LinkSpec {
         Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain. The time includes 1 ms for computing.
+    /// Returns the time that a message of maximum length needs from one relay to the next. The time includes the
+    /// latency of the link, and 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let frame = self.line_time(MAX_SWEEP).as_micros();
         Duration::from_micros(frame + self.latency.as_micros() + 1_000)

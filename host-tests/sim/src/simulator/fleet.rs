@@ -19,8 +19,8 @@ pub struct Takeover {
     pub from: Instant,
     /// End of the takeover; `None` if it is permanent.
     ///
-    /// After the end the pilot hands the drone back to its relay, as soon as the drone hovers and no second drone moves
-    /// nearby.
+    /// After the end the pilot hands the drone back to its relay, as soon as this drone hovers and no drone near it
+    /// moves.
     pub until: Option<Instant>,
     /// Position to which the pilot flies the drone, m: x from Tx toward Rx, y to the right, and height.
     ///
@@ -102,7 +102,8 @@ const AWAY: Duration = Duration::from_millis(3_000);
 /// The autopilot reports both once a second.
 const MODE_KNOWN_WITHIN: Duration = Duration::from_millis(1_500);
 
-/// Height by which a drone climbs after its pilot has taken it over, so that it leaves the chain, m.
+/// Height by which a drone climbs when its pilot takes it over without a destination, m. The climb takes the drone out
+/// of the chain.
 const ASIDE_M: f64 = 15.0;
 
 /// Value of MAVLink's `MAV_LANDED_STATE` for a drone on the ground.
@@ -127,7 +128,8 @@ pub(super) struct Vehicle {
     kind: Kind,
     spec: FleetSpec,
     pub(super) link: Autopilot,
-    /// Geographic positions of Tx and Rx in the relay's mission; `None` unless an upload has moved them.
+    /// Geographic positions of Tx and Rx from an uploaded mission that the relay uses. `None` if the relay's mission
+    /// has the original positions.
     pub(super) sites: Option<Sites>,
     pilot: Pilot,
     body: Body,
@@ -150,9 +152,9 @@ pub(super) struct Vehicle {
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Time until which position targets do not count as errors although the autopilot rejects them.
+    /// End of a period in which position targets do not count as errors even if the autopilot rejects them.
     ///
-    /// The autopilot has changed its mode or state, and the relay may not know this yet.
+    /// The period begins when the autopilot's mode or state changes, because the relay may not know the change yet.
     unknown_until: Instant,
     pub(super) strays: u64,
     rng: ChaCha8Rng,
@@ -210,7 +212,8 @@ impl Vehicle {
         })
     }
 
-    /// Returns the geographic line from Tx to Rx of the relay's mission. An upload may have moved this line.
+    /// Returns the geographic line from Tx to Rx in the mission that the relay uses. An uploaded mission may have a
+    /// line that differs from the original one.
     fn line(&self) -> Axis {
         let moved = self.sites.and_then(|sites| Axis::between(sites).ok());
         moved.unwrap_or(self.spec.axis)
@@ -226,9 +229,10 @@ impl Vehicle {
         along.map_or([f64::NAN; 3], point)
     }
 
-    /// Converts a relay's position, m, to coordinates of the line from Tx to Rx at the start of the run.
+    /// Converts a position in the relay's mission, m, to the coordinates at the start of the run.
     ///
-    /// The relay's own line differs if an upload has moved Tx or Rx. `None` if the position is too far from the line.
+    /// Both are relative to a line from Tx to Rx, which an uploaded mission can move. `None` if the position is too far
+    /// from the original line.
     pub(super) fn in_run_coordinates(&self, place: Placement) -> Option<Point> {
         let on_earth = self.line().point(place)?;
         self.spec.axis.place(on_earth).map(point)
@@ -317,10 +321,10 @@ impl Vehicle {
         }
     }
 
-    /// Updates the flight mode and the flight state, which the pilot and the autopilot decide.
+    /// Updates the flight mode and the flight state, by decisions of the pilot and of the autopilot.
     ///
-    /// For [`MODE_KNOWN_WITHIN`] after a change, position targets of the relay do not count as errors: the relay may
-    /// not know the change yet.
+    /// For the time [`MODE_KNOWN_WITHIN`] after a change, rejected position targets of the relay do not count as
+    /// errors, because the relay may not know the change yet.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);
@@ -500,9 +504,10 @@ const FIRST_S: u64 = 5;
 /// Time between the take-offs of two successive drones, ms.
 const NEXT_MS: u64 = 500;
 
-/// Delay before a pilot hands the drone to its relay, s, after the climb and after a failed attempt.
+/// Delay, s, before a pilot hands the drone to its relay: after the climb, or after a failed attempt.
 const LOOKS_S: u64 = 2;
-/// Delay from a failsafe, or a restart of autopilot or relay, to the pilot's next hand-over, s.
+/// Delay, s, before a pilot hands the drone to its relay after a failsafe or a restart. The restart may be one of the
+/// autopilot or of the relay.
 const RECOVERS_S: u64 = 10;
 
 /// Flight mode of a drone: control by the pilot, the autopilot or the relay.
@@ -574,7 +579,7 @@ impl Pilot {
         self.takeovers.iter().find(during)?.to
     }
 
-    /// Plans a new hand-over after the autopilot has rejected the flight mode.
+    /// Plans a new attempt to hand the drone over to the relay, after the previous attempt has failed.
     fn schedule_retry(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * LOOKS_S));
     }

@@ -23,7 +23,7 @@ pub enum AirEvent {
     End(usize),
 }
 
-/// Future events of radios, with the times at which the caller must give them to [`Medium::happen`].
+/// List of radio events that are due later. The caller gives each to [`Medium::happen`] at its time.
 pub type Agenda = Vec<(Instant, AirEvent)>;
 
 /// Frame whose transmission has ended, with its receivers.
@@ -37,12 +37,12 @@ pub struct Sent {
     pub heard_by: Vec<usize>,
     /// Number of nodes in range that did not receive the frame.
     ///
-    /// Either a second frame overlapped with this frame at the node, or the node's own radio was sending or turning to
-    /// sending.
+    /// At such a node a different frame overlapped with it, or the node's own radio was sending or turning to sending.
+    /// Also counted if the sender was switched off.
     pub missed: usize,
 }
 
-/// State of the reception of a frame at one node in range.
+/// Result of the reception of a frame at one node in radio range of the sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Reception {
     Clean,
@@ -123,7 +123,8 @@ impl Medium {
 
     /// Processes an event whose time has come. If it is the end of a frame, returns this frame.
     ///
-    /// `hearers` returns the nodes in range of a sending node. Events that follow are appended to `agenda`.
+    /// `hearers` returns the nodes in range of a sending node. Events that result from this event are appended to
+    /// `agenda`.
     pub fn happen(
         &mut self,
         now: Instant,
@@ -139,7 +140,8 @@ impl Medium {
         None
     }
 
-    /// Switches off the radio of `node` (from 0). Its queue is lost, and nobody receives a frame that it was sending.
+    /// Switches off the radio of `node` (from 0). The frames in its queue are lost. A frame that it is sending is
+    /// received by no node.
     pub fn switch_off(&mut self, node: usize) {
         if let Some(radio) = self.radios.get_mut(node) {
             radio.queue.clear();
@@ -281,12 +283,14 @@ impl Medium {
 }
 
 impl OnAir {
-    /// Returns true if the frame is on the air and `node` is in range. A frame that ends now does not interfere.
+    /// Returns true if the frame is still being sent at `now`, and `node` is in range of its sender. False if the frame
+    /// ends exactly at `now`.
     fn is_heard(&self, node: usize, now: Instant) -> bool {
         self.ends > now && self.hearers.iter().any(|(by, _)| *by == node)
     }
 
-    /// Marks the frame as lost at `node`, for the reason `how`. Does nothing if the reception has ended, or was marked as lost before.
+    /// Marks the frame as lost at `node`, with the result `how` of the reception. Does nothing if the frame has ended,
+    /// or was already lost at this node.
     fn spoil(&mut self, node: usize, now: Instant, how: Reception) {
         if self.ends <= now {
             return;
@@ -324,7 +328,7 @@ pub const HEADER: usize = 6;
 /// The radio neither sends nor receives meanwhile.
 pub const TURNAROUND: usize = 6;
 
-/// Time on the air that a frame takes in addition to its bytes, as a number of bytes.
+/// Time on the air that a frame takes in addition to its own bytes, in byte times.
 pub const OVERHEAD: usize = HEADER + TURNAROUND;
 
 /// Unit of the random wait before sending, in byte times: `aUnitBackoffPeriod`, 20 symbols.
@@ -348,7 +352,7 @@ pub const QUEUE: usize = 4;
 pub struct AirCounts {
     /// Number of frames sent by all nodes.
     pub sent: u64,
-    /// Number of receptions lost because frames overlapped.
+    /// Number of receptions that failed because frames overlapped. A frame that is lost at two nodes counts twice.
     pub collided: u64,
     /// Number of receptions lost because the receiver was sending or turning to sending. Receptions also count here if
     /// their sender was switched off during the transmission.

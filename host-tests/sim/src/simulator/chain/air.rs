@@ -46,7 +46,7 @@ impl Chain {
         self.keep_frame(self.sent_at(arrives), link(index, port), frame, note);
     }
 
-    /// Records a sent frame for the attacker, which can replay it after its arrival at `arrives`.
+    /// Gives a copy of a sent frame to the attacker, who can replay it after its arrival at `arrives`.
     ///
     /// `into` is the port at which receivers get the frame.
     pub(super) fn overhear(&mut self, frame: &[u8], into: Port, arrives: Instant) {
@@ -59,10 +59,10 @@ impl Chain {
         }
     }
 
-    /// Queues the arrivals of a frame at its receivers and returns a description of its faults.
+    /// Queues the arrivals of a frame at `receivers`, with random faults. Returns a text about these faults.
     ///
-    /// The frame was sent by node `from`, and arrives at port `into`. It arrives at the time `arrives` unless a fault
-    /// delays it.
+    /// The frame was sent by node `from`, and arrives at the receivers' port `into`. It arrives at the time `arrives`
+    /// unless a fault delays it.
     pub(super) fn send(
         &mut self,
         from: usize,
@@ -223,9 +223,9 @@ impl Chain {
         }
     }
 
-    /// Appends to `note` the faults of a frame on the way to `receiver`: lost, twice, changed or late.
+    /// Appends a text to `note`: the faults of a frame at one receiver (lost, twice, changed or late).
     ///
-    /// `arrivals` are the arrivals of `frame` at the receiver, after the faults.
+    /// `arrivals` are the arrivals of `frame` at `receiver`, after the faults.
     pub(super) fn remark(
         &self,
         note: &mut String,
@@ -275,7 +275,7 @@ pub(super) fn link(index: usize, port: Port) -> Link {
     }
 }
 
-/// Largest difference between the numbers of two neighbours, even if the radio range is larger.
+/// Largest difference of node numbers between neighbours, even if the radios reach farther.
 const NEIGHBOUR: usize = 4;
 
 impl Chain {
@@ -295,7 +295,7 @@ impl Chain {
             .any(|part| part.parts(number(one), number(other), self.now))
     }
 
-    /// Returns true if no failure prevents relay `by` from receiving relay `of` now; both count from 0.
+    /// Returns true if relay `by` can receive relay `of` now, as far as failures count. Both numbers are from 0.
     ///
     /// A failure is a partition or a one-way link failure. The radio range is not checked.
     pub(super) fn hears(&self, by: usize, of: usize) -> bool {
@@ -308,7 +308,8 @@ impl Chain {
 
     /// Returns true if the relays `one` and `other` (from 0) can be neighbours at present.
     ///
-    /// The two relays must be near each other in the chain and receive each other.
+    /// Their numbers must differ by at most [`NEIGHBOUR`] and the radio range, and the two relays must receive each
+    /// other.
     pub(super) fn are_linked(&self, one: usize, other: usize) -> bool {
         let most = self.reach().min(NEIGHBOUR);
         one.abs_diff(other) <= most && self.hears(one, other) && self.hears(other, one)

@@ -15,12 +15,12 @@ const STEP: Duration = Duration::from_millis(50);
 /// Distance of a drone from its agreed position below which it counts as arrived, m.
 const ARRIVED_M: f64 = 1.0;
 
-/// Interval at which the simulated operator looks for landed drones of lost relays.
+/// Period of the simulated operator's checks for landed drones whose relays were lost.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
-/// Distance to keep from moving drones during a hand-over, m, in addition to the required separation.
+/// Least distance from moving drones at a hand-over, m, in addition to the mission's separation.
 ///
-/// A pilot does not hand a drone over to its relay while a moving drone is nearer to it.
+/// A pilot hands a drone over to its relay only if no moving drone is nearer than the sum of the two distances.
 const TRAFFIC_M: f64 = 30.0;
 
 /// Time until a pilot lands a drone, after its relay was switched off or after a permanent takeover.
@@ -66,9 +66,10 @@ impl Chain {
         self.queue.put(self.now + STEP, 0, QueuedEvent::Fly);
     }
 
-    /// Updates `margin_m` of the outcome: the smallest distance of two drones minus the required distance.
+    /// Updates `margin_m` of the outcome: the smallest margin of the distance between two drones.
     ///
-    /// It checks all pairs of flying drones that no pilot controls.
+    /// The margin is the distance minus the mission's separation, or minus the distance at which both drones came under
+    /// automatic control, if that is smaller. Only flying drones that no pilot controls count.
     fn measure_pairs(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let count = self.fleet.len();
@@ -96,7 +97,7 @@ impl Chain {
         }
     }
 
-    /// Updates the flag `is_clear` of each drone: true if its pilot sees no moving drone near this drone.
+    /// Updates the flag `is_clear` of each drone. The flag is true if no second drone moves near this drone.
     fn update_traffic(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let seen: Vec<(Point, bool)> = self
@@ -164,8 +165,8 @@ impl Chain {
 
     /// Simulates an operator who confirms to a relay that the drones of lost neighbours have landed.
     ///
-    /// The relay then no longer keeps away from these drones. The operator waits until two relays have controlled their
-    /// drones for [`LANDS_AFTER`]: this relay, and the next relay beyond the lost neighbours with a flying drone.
+    /// The relay then stops keeping away from these drones. The operator waits until the relay and, on the side of the
+    /// lost neighbours, the nearest relay with a flying drone have controlled their drones for [`LANDS_AFTER`].
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {
@@ -224,9 +225,9 @@ impl Chain {
         }
     }
 
-    /// Returns true if every drone that a living relay should control hovers at its agreed position.
+    /// Returns true if all drones hover at their relays' agreed positions, each under its relay's control.
     ///
-    /// Drones that their pilots control do not count.
+    /// Drones of relays that are off, and drones that their pilots have taken over, do not count.
     pub(super) fn all_hover(&self) -> bool {
         let controlled = self.members.iter().zip(&self.fleet);
         controlled
@@ -313,7 +314,7 @@ impl Chain {
             .collect()
     }
 
-    /// Records `nearest`, two drones and their distance, if it is the closest approach of the run so far.
+    /// Records `nearest` (two drones and their distance) if it is the smallest distance of the run so far.
     pub(super) fn keep(&mut self, nearest: Option<Nearest>) {
         let known = self.outcome.nearest;
         if nearest.is_some_and(|it| known.is_none_or(|known| it.apart_m < known.apart_m)) {
@@ -321,10 +322,10 @@ impl Chain {
         }
     }
 
-    /// Returns true if each drone that is simulated without autopilot has reached its agreed position.
+    /// Returns true if each drone without a simulated autopilot has reached its relay's agreed position.
     ///
-    /// Drones of relays that are off do not count. The drone's own position estimate is used. True if there are no such
-    /// drones.
+    /// Drones of relays that are off do not count. The comparison uses each drone's position estimate. If the run has
+    /// no drones without autopilot, the result is true.
     pub(super) fn has_arrived(&self) -> bool {
         let Some(flight) = &self.flight else {
             return true;

@@ -236,7 +236,7 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
 impl Chain {
     /// Returns the position of the drone of relay `index` (from 0), m; `None` if no drones are simulated.
     ///
-    /// If the drone has no autopilot, it is the drone's own position estimate, otherwise the true position.
+    /// With a simulated autopilot it is the true position. Without one it is the drone's own position estimate.
     pub(super) fn drone(&self, index: usize) -> Option<Point> {
         let flight = self.flight.as_ref();
         flight
@@ -245,7 +245,7 @@ impl Chain {
             .or_else(|| self.fleet.get(index).map(Vehicle::at))
     }
 
-    /// Lets every living relay measure the interference at its position, and records all positions.
+    /// Lets every relay that is on measure the interference, and records the relays' positions.
     pub(super) fn measure_all(&mut self) {
         let Some(true_interference) = self.setup.true_interference.clone() else {
             return;
@@ -389,7 +389,7 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// Draws the destination and the claimed sender of a forged frame.
+    /// Draws the destination of a forged frame, and the node that the frame names as its sender.
     ///
     /// The destination is a relay, the sender a relay or ground station that can be the neighbour of this relay.
     fn forged_route(&self, attacker: &mut Attacker) -> ForgedRoute {
@@ -419,9 +419,10 @@ impl Chain {
         }
     }
 
-    /// Returns the index (from 0) of the relay that an attacker's frame for relay `to` (from 1) reaches.
+    /// Returns the index (from 0) of the relay that receives an attacker's frame for relay `to` (from 1).
     ///
-    /// If that relay is not alive, or `to` is `None`, it is a random living relay. `None` if no relay is alive.
+    /// If relay `to` is off, or `to` is `None`, a random relay that is on receives the frame. `None` if all relays are
+    /// off.
     fn reached(&self, to: Option<u16>, attacker: &mut Attacker) -> Option<usize> {
         let living = |member: &Member| member.killed.is_none();
         let meant = to.and_then(|to| usize::from(to).checked_sub(1));

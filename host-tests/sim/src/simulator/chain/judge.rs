@@ -17,7 +17,7 @@ pub(super) enum ChangedRelays {
     None,
     /// A single relay with this index, from 0.
     One(usize),
-    /// Any relay, or the links between relays.
+    /// The event may have changed any number of relays, or the links between them.
     All,
 }
 
@@ -42,7 +42,8 @@ impl Chain {
         self.watch = Some(Watch::new(seen, run));
     }
 
-    /// Updates the run's records and statistics after an event that may have changed the relays `changed`.
+    /// Updates the run's records and statistics after an event that may have changed the relays `changed`. The data
+    /// traffic and the availability are computed from them.
     pub(super) fn update_statistics(&mut self, changed: ChangedRelays) {
         if changed == ChangedRelays::None {
             return;
@@ -55,7 +56,8 @@ impl Chain {
         self.watch = Some(watch);
     }
 
-    /// Records changed states of the relays `changed`, from which the data traffic is computed later.
+    /// Records the present states of the relays `changed`. The data traffic is computed from these records after the
+    /// run.
     fn track(&mut self, changed: ChangedRelays) {
         let Some(mut track) = self.outcome.track.take() else {
             return;
@@ -103,10 +105,10 @@ impl Chain {
         }
     }
 
-    /// Returns true if the chain is available: at the positions that it would reach in a fault-free run.
+    /// Returns true if the chain is available, which means at the positions of a run without faults.
     ///
-    /// At least one of the longest chains that the living relays can form must be at its positions. If these chains are
-    /// too small for a quorum, their relays have no positions, and the result is false.
+    /// One of the longest chains that living relays can form must be at the positions that this chain reaches without
+    /// faults. A chain too small for a quorum has no positions, and is not available.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
@@ -190,7 +192,7 @@ impl Chain {
         (settled && others).then_some(Ending::Settled)
     }
 
-    /// Ends the run if its next event, at the time `next`, is after its fixed end (`soak` of the setup).
+    /// Ends the run at the time `soak` of the setup, if the next event, at the time `next`, is later.
     pub(super) fn end_soak(&mut self, next: Instant) {
         if let Some(until) = self.setup.soak
             && next > until
@@ -200,7 +202,7 @@ impl Chain {
         }
     }
 
-    /// Groups the living relays into parts of the chain that can communicate, in order from Tx.
+    /// Groups the relays that are on into connected parts of the chain, in order from Tx.
     ///
     /// A part ends at a partition, and before a gap that is wider than the radio range.
     fn parts(&self) -> Vec<Vec<&Member>> {
@@ -225,7 +227,7 @@ impl Chain {
         parts
     }
 
-    /// Returns true if every living neighbour of each silent relay has reported that relay as lost.
+    /// Returns true if every relay that is off has been reported as lost by its neighbours that are on.
     fn all_noticed(&self) -> bool {
         let noticed = |by: usize, side| {
             let Some(member) = self.members.get(by) else {
@@ -247,17 +249,16 @@ impl Chain {
     }
 }
 
-/// Returns true if `part` contains all relays of one view, in the order of their indices.
+/// Returns true if `part` is a complete view: all its relays, sorted by their indices in the view.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
     })
 }
 
-/// Returns true if no part of the chain has enough relays for a quorum, and the relays have noticed it.
+/// Returns true if every part of the chain is too small for a quorum, and the relays know it.
 ///
-/// They have noticed it once each relay knows its present neighbours, and one relay of each part has reported the
-/// missing quorum.
+/// They know it if each relay has detected its present neighbours, and one relay of each part has reported `NoQuorum`.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));
@@ -276,7 +277,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all relays of `part` have agreed positions for the same target SIR.
+/// Returns true if each relay of `part` has an agreed position, and their target SIRs are equal.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()
@@ -290,7 +291,7 @@ fn holds(part: &[&Member]) -> bool {
 impl Chain {
     /// Checks that the setpoint of relay `index` (from 0) is within its limits, and counts violations.
     ///
-    /// It also records the SIR after each round of Algorithm 2, the stepwise improvement of the positions.
+    /// It also records the SIR after each round of Algorithm 2. In a round each relay in turn improves its position.
     pub(super) fn check(&mut self, index: usize) {
         let Some(member) = self.members.get_mut(index) else {
             return;
@@ -485,7 +486,7 @@ impl Chain {
 }
 
 impl Member {
-    /// Returns the number of passes and view proposals that this relay has begun, also before reboots.
+    /// Returns the number of passes and view proposals of this relay, those before its reboots included.
     ///
     /// A pass is a message that relays forward along the whole chain.
     fn begun(&self) -> u32 {

@@ -9,7 +9,8 @@ use crate::simulator::outcome::Moment;
 /// State of a relay during a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LiveRelay {
-    /// Present state, as the relay reports it. The position is the drone's position, or without drones the setpoint.
+    /// Present state of the relay in the form of a telemetry report. If no drones are simulated, the setpoint is given
+    /// as the position.
     pub report: Report,
     /// True while the relay is switched on.
     pub is_on: bool,
@@ -22,8 +23,8 @@ pub struct LiveRelay {
 }
 
 impl Chain {
-    /// Processes all events up to the virtual time `until`, also after the chain has settled. Returns true once the run has reached the
-    /// setup's deadline or the limit on the number of events.
+    /// Processes all events up to the virtual time `until`, also after relays have agreed on positions. Returns true
+    /// once the run has reached the setup's deadline or the limit on the number of events.
     pub fn advance(&mut self, until: Instant) -> bool {
         let by = until.min(self.setup.deadline);
         while self.events < MAX_EVENTS

@@ -1,4 +1,4 @@
-//! Replacement of tired drones: pilots, spares, returns, and the measured SIR.
+//! Replacement of drones whose batteries run low: pilots, spares, returns, and the measured SIR.
 
 use rand::RngExt;
 use uav_relay::{Departure, Duration, HoldReason, Instant, Side};
@@ -27,17 +27,18 @@ const PILOTS: Duration = Duration::from_millis(1_000);
 /// Least time between two take-offs.
 const TAKE_OFFS: Duration = Duration::from_millis(8_000);
 
-/// Distance from a position below which a drone has arrived, m.
+/// Distance of a drone from a point of its path, m, below which the drone has reached this point.
 const ARRIVED_M: f64 = 0.5;
 
-/// Time by which a spare reaches its place beside the line before it is needed, s.
+/// Time, s, for which a spare should already wait beside the line when a drone has to leave.
 const EARLY_S: f64 = 40.0;
 
-/// Time before a drone has to fly home, s, from which its relay requests to leave even without a spare.
+/// Time left to a drone, s, at which its relay requests to leave even if no spare waits. After this time the drone has
+/// to fly home.
 const DEADLINE_S: f64 = 40.0;
 
-/// Time for which a drone must hover at its waiting place before it counts as a spare. Only then is a departure
-/// requested.
+/// Time for which a drone must hover beside the line before it counts as a spare that is ready to join. A relay
+/// requests to leave early only if such a spare is ready.
 const HOVERS: Duration = Duration::from_millis(13_000);
 
 /// Converts an endurance to whole seconds within 0 to 60 000.
@@ -124,7 +125,8 @@ impl Chain {
         self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
     }
 
-    /// Returns the linear SIR of the worst hop over relays at `places`, in order from Tx; 0 without any.
+    /// Returns the linear SIR of the worst hop of a chain of relays at `places`, in order from Tx. The result is 0
+    /// without any relay.
     fn worst_hop(&self, places: &[Point]) -> f64 {
         let mission = &self.setup.mission;
         let common = mission.config().common;
@@ -145,10 +147,10 @@ impl Chain {
         all.fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the linear SIR of the worst hop now, on the best route of the data.
+    /// Returns the linear SIR of the chain's worst hop at present, if the data take the best route.
     ///
-    /// The route may leave out relays that are about to leave or have just joined, at most six of them. The positions are the drones' own
-    /// estimates, without noise: a constant position error is no fault of the chain.
+    /// The route may leave out up to six relays that are about to leave or have just joined. Constant position errors
+    /// do not count: the positions are the drones' own estimates, without noise.
     fn served(&self, rotation: &Rotation, flight: &Flight) -> f64 {
         let mut fixed = Vec::new();
         let mut optional = Vec::new();
@@ -203,7 +205,7 @@ impl Chain {
         }
     }
 
-    /// Moves all drones up to the present time, records the SIR, and makes the pilots' decisions.
+    /// Moves all drones up to the present time, records the chain's SIR, and makes the pilots' decisions.
     pub(super) fn rotate(&mut self) {
         let now = self.now;
         let (Some(mut rotation), Some(mut flight)) = (self.rotation.take(), self.flight.take())
@@ -329,9 +331,9 @@ impl Chain {
         }
     }
 
-    /// Returns true if all serving relays are in one view, with leases and agreed positions.
+    /// Returns true if the relays that serve are all relays of one view, with leases and agreed positions.
     ///
-    /// Relays that have left the chain do not count.
+    /// A view is an agreed set of the chain's members. Relays that have left the chain do not serve.
     fn is_whole(&self, rotation: &Rotation) -> bool {
         let members = self.members.iter().zip(&rotation.drones);
         let on: Vec<_> = members
@@ -353,10 +355,10 @@ impl Chain {
         leased && same && count && has_agreed(&on)
     }
 
-    /// Sets the goal of drone `index` (from 0): the relay's setpoint, or the next point of its path.
+    /// Sets the position to which drone `index` (from 0) flies. Returns true if the drone moves.
     ///
-    /// Also switches the relay on or off if the drone arrives, and lets the drone fly home if it may leave. Returns
-    /// true if the drone moves.
+    /// The position is the relay's setpoint, or the next point of the path to or from the line. At the end of the path,
+    /// the relay is switched on or off. A drone that has permission to leave flies home.
     fn steer_drone(&mut self, rotation: &mut Rotation, flight: &mut Flight, index: usize) -> bool {
         let now = self.now;
         let Some(drone) = flight.drones.get_mut(index) else {
@@ -454,8 +456,8 @@ impl Chain {
         }
     }
 
-    /// Switches relay `index` (from 0) on. If `spare` is true, the relay waits outside of the chain; otherwise the
-    /// relay joins as a lost relay that returns.
+    /// Switches relay `index` (from 0) on. If `spare` is true, the relay waits outside of the chain. Otherwise it joins
+    /// at once, like a relay that was lost and returns.
     fn switch_on(&mut self, index: usize, spare: bool) {
         let node = u16::try_from(index + 1).unwrap_or(u16::MAX);
         self.setup.spares.retain(|other| *other != node);
@@ -510,7 +512,7 @@ impl Chain {
         }
     }
 
-    /// Makes the pilots' decisions: they send spares, request departures, and report drones that are gone.
+    /// Makes the pilots' decisions: they send spares, request departures, and report drones that have left.
     fn decide(&mut self, rotation: &mut Rotation, flight: &Flight) {
         let now = self.now;
         let mut tired: Vec<(usize, f64)> = Vec::new();
@@ -575,7 +577,8 @@ impl Chain {
         self.report_gone(rotation, flight);
     }
 
-    /// Simulates an operator who lets one waiting spare join if relays are missing, and none joins already.
+    /// Simulates an operator who lets a waiting spare join if the chain has too few relays. Does nothing while a relay
+    /// is leaving or joining.
     fn call_spare(&mut self, rotation: &Rotation) {
         let now = self.now;
         let mut present = 0;
@@ -604,7 +607,7 @@ impl Chain {
         }
     }
 
-    /// Sends at most one spare to the line, if fewer spares wait there than are needed soon.
+    /// Sends at most one spare to its place beside the line, if too few spares are in the air.
     ///
     /// A spare is needed for each drone that has to leave soon, and for each missing drone.
     fn send_spares(
@@ -671,9 +674,10 @@ impl Chain {
         }
     }
 
-    /// Returns the nearest serving drones on both sides of drone `index` (from 0) by their numbers.
+    /// Returns the nearest drones in the chain with a lower and with a higher number than drone `index`.
     ///
-    /// The first is toward Tx, the second toward Rx. `None` if no drone serves on that side.
+    /// The first is toward Tx, the second toward Rx; all numbers are from 0. `None` if there is no such drone on that
+    /// side.
     fn gap(rotation: &Rotation, index: usize) -> [Option<usize>; 2] {
         let serves = |other: &usize| {
             rotation
@@ -717,7 +721,8 @@ impl Chain {
         }
     }
 
-    /// Switches on the relay of one waiting spare after a loss. It joins as a lost relay that returns.
+    /// Switches on the relay of one waiting spare after a drone has left without announcement. It joins at once, like a
+    /// relay that was lost and returns.
     fn join_as_lost(&mut self, rotation: &Rotation) {
         let waits = |index: &usize| {
             let off = self
@@ -734,9 +739,9 @@ impl Chain {
         }
     }
 
-    /// Simulates operators: they report to the relays beside it that a drone has left the line.
+    /// Simulates operators who report to neighbouring relays that a drone has left the line.
     ///
-    /// They do so once when it has left, and to a relay that waits for it.
+    /// They report it once when it has left, and again to a relay whose setpoint is held because of the drone.
     fn report_gone(&mut self, rotation: &mut Rotation, flight: &Flight) {
         let now = self.now;
         let is_clear = |index: usize| {
@@ -795,5 +800,6 @@ impl Chain {
     }
 }
 
-/// Time by which a drone without permission exceeds its latest start for home before it flies home, s.
+/// Time, s, for which a drone without permission stays after it should have started home. Then it flies home without
+/// permission.
 const RETREAT_S: f64 = 60.0;
