@@ -108,7 +108,8 @@ struct Departures {
     /// Relay that requests to leave (0 for none), and the time of its first request. The request may be from an earlier
     /// view.
     leaver: (u16, Instant),
-    /// Time of the agreement on positions in this view, as seen by the leader.
+    /// Time of the first agreement on positions in this view, or the last time at which two renewals in a row reported
+    /// all relays in place. As seen by the leader.
     settled_at: Instant,
     /// Time at which this view's first renewal turned at the last relay; `None` until it has completed.
     turned_at: Option<Instant>,
@@ -168,7 +169,8 @@ impl Lease {
     /// that left the chain earlier knows that all relays are in place. If there is a spare, the spare joins first. No
     /// spare is called if the view already has more relays than before the request.
     ///
-    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease. A relay waits for
+    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease, counted from the
+    /// first agreement in this view, or from the last time that all were in place. A relay waits for
     /// its order to leave at most this maximum duration, and at most its remaining endurance. So at least half of the
     /// endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
@@ -177,6 +179,9 @@ impl Lease {
         };
         let (now, most) = (context.now, longest_lease(context.settings()));
         let relays = context.mission().relays();
+        if requests.in_place && self.orders.in_place {
+            known.settled_at = now;
+        }
         let in_place = requests.in_place || now.since(known.settled_at).times(2) >= most;
         let mut orders = Orders {
             in_place,

@@ -38,8 +38,14 @@ struct Motion {
     waits: bool,
 }
 
-/// Longest wait until the common start time of the relays' motions is known.
-const WAIT: Duration = Duration::from_millis(15_000);
+/// Common start time of the relays' motions to newly agreed positions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Begin {
+    /// The start time.
+    At(Instant),
+    /// Not known yet: the motion begins at this time if the start time remains unknown.
+    By(Instant),
+}
 
 /// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that they arrive together.
 #[derive(Clone, Copy, Debug)]
@@ -62,16 +68,15 @@ impl Way {
     /// Returns the position to fly to at `now`; `None` without an agreed position. If the agreed position `agreed` has
     /// changed, the position to fly to moves there in 32 steps within the time `span`.
     ///
-    /// The motion begins at `begin`, the same time at all relays of the view. If `begin` stays `None`, the motion
-    /// begins after [`WAIT`].
+    /// The motion begins at `begin`, the same time at all relays of the view.
     fn advance(
         &mut self,
         now: Instant,
         agreed: Option<Placement>,
         span: Duration,
-        begin: Option<Instant>,
+        begin: Begin,
     ) -> Option<Placement> {
-        if let (Some(motion), Some(begin)) = (&mut self.motion, begin)
+        if let (Some(motion), Begin::At(begin)) = (&mut self.motion, begin)
             && core::mem::take(&mut motion.waits)
             && now < motion.since
         {
@@ -85,13 +90,16 @@ impl Way {
         if span == Duration::from_micros(0) || agreed.is_none() || self.wanted.is_none() {
             (self.motion, self.wanted) = (None, agreed);
         } else if self.motion.is_none() {
-            let since = if begin.is_some() { now } else { now + WAIT };
+            let (since, waits) = match begin {
+                Begin::At(_) => (now, false),
+                Begin::By(latest) => (latest, true),
+            };
             self.motion = Some(Motion {
                 since,
                 span,
                 at: since,
                 done: 0.0,
-                waits: begin.is_none(),
+                waits,
             });
         }
         // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
@@ -173,7 +181,7 @@ impl Steering {
         now: Instant,
         agreed: Option<Placement>,
         span: Duration,
-        begin: Option<Instant>,
+        begin: Begin,
     ) -> bool {
         let agreed = match self.way.first_mut() {
             Some(way) => way.advance(now, agreed, span, begin),
@@ -318,9 +326,13 @@ impl Steering {
 
 #[cfg(all(test, feature = "departures"))]
 mod tests {
-    use super::Steering;
+    use super::{Begin, Steering};
     use crate::place::Placement;
     use crate::time::{Duration, Instant};
+
+    const fn unknown(now_ms: u64) -> Begin {
+        Begin::By(Instant::from_millis(now_ms + 15_000))
+    }
 
     fn at_ms(ms: u64) -> Instant {
         Instant::ZERO + Duration::from_millis(ms)
@@ -332,15 +344,21 @@ mod tests {
         let span = Duration::from_millis(20_000);
         let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
         let mut all = [Steering::NONE; 2].map(|mut steering| {
-            steering.steer(at_ms(0), place(0.0), span, None);
+            steering.steer(at_ms(0), place(0.0), span, unknown(0));
             steering
         });
         let [one, other] = &mut all;
-        one.steer(at_ms(1_000), place(100.0), span, None);
-        other.steer(at_ms(2_300), place(100.0), span, None);
+        one.steer(at_ms(1_000), place(100.0), span, unknown(1_000));
+        other.steer(at_ms(2_300), place(100.0), span, unknown(2_300));
         for ms in (2_500..30_000).step_by(500) {
             // The second one learns the beginning after it.
-            let begin = |known_at: u64| (ms >= known_at).then_some(at_ms(3_000));
+            let begin = |known_at: u64| {
+                if ms >= known_at {
+                    Begin::At(at_ms(3_000))
+                } else {
+                    unknown(ms)
+                }
+            };
             one.steer(at_ms(ms), place(100.0), span, begin(2_500));
             other.steer(at_ms(ms), place(100.0), span, begin(4_500));
             let [x_m, other_m] = [&one, &other].map(|it| it.setpoint(place(100.0)).unwrap().x_m);
@@ -350,10 +368,10 @@ mod tests {
             assert_eq!(one.is_moving(), ms < 23_000, "{ms}: {x_m}");
         }
         // Without a beginning, after the longest wait.
-        one.steer(at_ms(30_000), place(0.0), span, None);
-        one.steer(at_ms(44_900), place(0.0), span, None);
+        one.steer(at_ms(30_000), place(0.0), span, unknown(30_000));
+        one.steer(at_ms(44_900), place(0.0), span, unknown(44_900));
         assert_eq!(one.setpoint(place(0.0)), place(100.0));
-        one.steer(at_ms(55_000), place(0.0), span, None);
+        one.steer(at_ms(55_000), place(0.0), span, unknown(55_000));
         let half_m = one.setpoint(place(0.0)).unwrap().x_m;
         assert!((half_m - 50.0).abs() < 0.1, "{half_m}");
     }
@@ -364,13 +382,13 @@ mod tests {
         let span = Duration::from_millis(20_000);
         let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
         let mut steering = Steering::NONE;
-        steering.steer(at_ms(0), place(0.0), span, None);
+        steering.steer(at_ms(0), place(0.0), span, unknown(0));
         let mut reached_m = 0.0;
         let mut agreed = None;
         for step in 0..20 {
             // Every second another agreement, a little farther.
             agreed = place(100.0 + step as f32 / 10.0);
-            steering.steer(at_ms(1_000 * step), agreed, span, Some(at_ms(0)));
+            steering.steer(at_ms(1_000 * step), agreed, span, Begin::At(at_ms(0)));
             let x_m = steering.setpoint(agreed).unwrap().x_m;
             assert!(
                 x_m >= reached_m && x_m <= reached_m + 10.0,
@@ -378,7 +396,7 @@ mod tests {
             );
             reached_m = x_m;
         }
-        steering.steer(at_ms(20_000), agreed, span, Some(at_ms(0)));
+        steering.steer(at_ms(20_000), agreed, span, Begin::At(at_ms(0)));
         assert!(!steering.is_moving() && steering.setpoint(agreed) == agreed);
     }
 }

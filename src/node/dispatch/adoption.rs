@@ -9,12 +9,17 @@ use crate::features::UPLOAD;
 use crate::guard::HoldReason;
 use crate::mission::Mission;
 use crate::node::context::{Member, ProposalOutcome};
+use crate::node::steering::Begin;
 use crate::place::Placement;
 use crate::settings::Method;
 use crate::side::{Heading, Side};
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
+
+/// Longest time for which a motion waits until the common start time is known, in addition to the time from the turn
+/// of a lease renewal to this start time.
+const WAIT: Duration = Duration::from_millis(15_000);
 
 impl Node {
     /// Handles the decision on a view proposal. If the proposal is accepted, starts the new view (list of members)
@@ -144,7 +149,8 @@ impl Node {
         // All relays know the turn of the first renewal by then.
         let relays = u32::from(self.member.mission.relays());
         let lead = self.member.settings.hop_time.times(4 * relays);
-        let begin = self.layers.lease.turned_at().map(|at| at + lead);
+        let turned_at = self.layers.lease.turned_at();
+        let begin = turned_at.map_or(Begin::By(now + WAIT + lead), |at| Begin::At(at + lead));
         if self.steering.steer(now, wanted, span, begin) {
             self.raise(Event::SetpointChanged);
         }
