@@ -330,7 +330,8 @@ pub(super) struct KeepOut {
     /// Nearest lost node on this side, and the limit of this relay's x due to all lost nodes, m. `None` if no node is
     /// lost.
     lost: Option<(u16, f32)>,
-    /// Number of the nearest lost node whose x was known, and the limit of x because of it, m. 0 without such a node.
+    /// Number of the nearest lost node whose x was known, and the x, m, that its drone is not nearer than. Number 0
+    /// without such a node.
     known: (u16, f32),
     /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if it is no closer now.
     /// Before this x, possibly only lateral offset and altitude keep this relay apart from the lost relay.
@@ -358,33 +359,39 @@ impl KeepOut {
     }
 
     /// Adds a lost relay at `side` as an obstacle. The lost relay has the number `node`, and limits this relay's x to
-    /// `limit_m`, m. If there already is a lost relay, the nearer node and the tighter limit are kept. `is_known` is
-    /// true if the x of the lost relay was known.
+    /// `limit_m`, m. If there already is a lost relay, the nearer node and the tighter limit are kept.
     #[inline(never)] // called from both sides
-    pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32, is_known: bool) {
-        let join = |(nearest, tightest_m): (u16, f32)| match side {
+    pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32) {
+        let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
+        self.lost = Some(match side {
             Side::Upstream => (nearest.max(node), tightest_m.max(limit_m)),
             Side::Downstream => (nearest.min(node), tightest_m.min(limit_m)),
+        });
+    }
+
+    /// Records that the drone of the lost relay `node` at `side` is no nearer than the x `x_m`. If there already is such
+    /// a lost relay, the nearer node is kept.
+    pub(super) const fn record_lost_x(&mut self, side: Side, node: u16, x_m: f32) {
+        let (known, _) = self.known;
+        let is_nearer = match side {
+            Side::Upstream => node > known,
+            Side::Downstream => node < known || known == 0,
         };
-        self.lost = Some(join(self.lost.unwrap_or((node, limit_m))));
-        if is_known {
-            let (before, _) = self.known;
-            let first = (node, limit_m);
-            self.known = join(if before == 0 { first } else { self.known });
+        if is_nearer {
+            self.known = (node, x_m);
         }
     }
 
-    /// Returns true if the new neighbour `node` at `x_m` may be on the wrong side of a lost drone along x. The number
-    /// of `node` is between that of this relay and that of the lost drone, so its x has to be between them, too. The
-    /// new neighbour knows nothing of the lost drone.
+    /// Returns true if the new neighbour `node` at `x_m` is on the wrong side of a lost drone along x, by more than the
+    /// errors of the reports. The number of `node` is between that of this relay and that of the lost drone, so its x
+    /// has to be between them, too. The new neighbour knows nothing of the lost drone.
     pub(super) fn bars(&self, side: Side, node: u16, x_m: f32, config: &GuardConfig) -> bool {
-        let (known, limit_m) = self.known;
-        // The lost drone is at least this far beyond the limit.
-        let beyond_m = config.separation_m - 2.0 * config.hover_m - config.rounding();
+        let (known, lost_m) = self.known;
+        let off_m = 2.0 * config.hover_m + config.rounding();
         known != 0
             && match side {
-                Side::Upstream => known < node && x_m < limit_m - beyond_m,
-                Side::Downstream => known > node && x_m > limit_m + beyond_m,
+                Side::Upstream => known < node && x_m < lost_m - off_m,
+                Side::Downstream => known > node && x_m > lost_m + off_m,
             }
     }
 

@@ -57,6 +57,11 @@ impl FenceFollower {
         if self.is_out_of_order(own) {
             self.keep_out.mark_disordered();
         }
+        let before = self.association.node;
+        if node < before && !self.association.has_no_flown_neighbour() && self.has_fence() {
+            let x_m = self.fence_m - self.requested_m.min(own.config.separation_m);
+            self.keep_out.record_lost_x(Side::Upstream, before, x_m);
+        }
         self.renew(own, jitter);
         self.association.node = node;
     }
@@ -73,8 +78,7 @@ impl FenceFollower {
             // Distance to be added if the neighbour was permitted to be closer than the separation, or was never
             // received.
             let missing_m = separation_m - self.requested_m.min(self.agreed_m).min(separation_m);
-            let (node, is_known) = (self.association.node, self.has_fence());
-            keep_out.add_lost(Side::Upstream, node, limit_m + missing_m, is_known);
+            keep_out.add_lost(Side::Upstream, self.association.node, limit_m + missing_m);
             if missing_m > 0.0 {
                 keep_out.mark_near(limit_m + missing_m);
             } else if !self.has_fence() {
@@ -116,7 +120,7 @@ impl FenceFollower {
         self.renew(own, jitter);
         if !was_absent {
             let (node, at_m) = (self.association.node, own.reachable.setpoint_m);
-            self.keep_out.add_lost(Side::Upstream, node, at_m, false);
+            self.keep_out.add_lost(Side::Upstream, node, at_m);
         }
         if is_ordered {
             self.association.mark_absent(association);

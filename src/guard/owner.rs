@@ -60,6 +60,12 @@ impl FenceOwner {
         if self.is_out_of_order(own) {
             self.keep_out.mark_disordered();
         }
+        let before = self.association.node;
+        let is_lost = node == 0 || node > before;
+        if is_lost && !self.association.has_no_flown_neighbour() && self.has_reply() {
+            let x_m = self.follower_low_m;
+            self.keep_out.record_lost_x(Side::Downstream, before, x_m);
+        }
         self.renew(own, jitter);
         self.association.node = node;
     }
@@ -71,8 +77,7 @@ impl FenceOwner {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
             let limit_m = self.max_x(own, own.config.separation_m);
-            let is_known = self.has_reply() && self.is_beyond(own);
-            keep_out.add_lost(Side::Downstream, self.association.node, limit_m, is_known);
+            keep_out.add_lost(Side::Downstream, self.association.node, limit_m);
             if !self.is_ordered(own) {
                 keep_out.mark_near(limit_m - own.config.separation_m);
             } else if self.has_reduced_step(own) || !self.clear {
@@ -112,7 +117,7 @@ impl FenceOwner {
         self.renew(own, jitter);
         if !was_absent {
             let (node, at_m) = (self.association.node, own.reachable.setpoint_m);
-            self.keep_out.add_lost(Side::Downstream, node, at_m, false);
+            self.keep_out.add_lost(Side::Downstream, node, at_m);
         }
         if is_ordered {
             self.association.mark_absent(association);
