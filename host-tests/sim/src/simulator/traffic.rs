@@ -24,8 +24,8 @@ use std::fmt;
 use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
-/// Number of packets that are sent after the end of a run, if the run ends by itself. The data rates that the report
-/// states are then averages over many packets.
+/// Number of packets that are sent after the end of a run that stops at its result, not at a set time. The data rates
+/// in the report are then averages over many packets.
 const AFTER: usize = 1_000;
 /// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;
@@ -162,8 +162,8 @@ pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
 
 /// Simulates packets through a chain from its first agreement on; `None` if the relays never agreed.
 ///
-/// `outcome` has the recorded states of `relays` relays. After a run that ends by itself, the traffic goes on in the
-/// final state: in each direction for 1000 packets, and 30 more for each hop.
+/// `outcome` has the recorded states of `relays` relays. After a run that stops at its result, not at a set time, the
+/// traffic goes on in the final state: in each direction for 1000 packets, and 30 more for each hop.
 ///
 /// # Errors
 /// [`TrafficError`] if the traffic is too much to simulate.
@@ -249,14 +249,15 @@ struct Queue {
     packets: VecDeque<Ps>,
     /// Hop on which the node sends; `None` while it cannot send.
     hop: Option<Hop>,
-    /// Slot time that the first packet still needs, ps, as of `since`; 0 before its transmission starts.
+    /// Time in the hop's slots, ps, that the first packet still needed at the time `since`. It is 0 before the packet's
+    /// transmission starts.
     rest: Ps,
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends of transmissions with a different number are out of
     /// date, and are ignored.
     number: u32,
-    /// Integral of the queue's length over time until `counted`, in packets times ps. The report computes the mean
-    /// length from it.
+    /// Integral of the queue's length over time, up to the time `counted`, in packets times ps. The mean length in the
+    /// report is computed from it.
     sum: u128,
     counted: Ps,
     most: usize,
