@@ -33,7 +33,7 @@ pub struct Fewest {
     pub proven: bool,
 }
 
-/// Highest target SIR that any number of relays meets, and the fewest relays that meet it.
+/// Highest target SIR that a chain of some number of relays meets, and the fewest relays for it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Most {
     /// Highest target SIR that can be met, linear, to 1e-6 relative.
@@ -74,7 +74,7 @@ impl Fewest {
 }
 
 impl Most {
-    /// Returns the highest target SIR that any number of relays meets.
+    /// Returns the highest target SIR that a chain of some number of relays meets.
     ///
     /// `None` if this target is below 1e-20 times the highest possible SIR of the first hop. With different altitudes,
     /// or a minimum separation, the target can be met but may not be the highest. Work: 33 times the work of

@@ -119,7 +119,7 @@ pub enum Ending {
     Settled,
     /// The leader found that the chain can meet no target SIR.
     Infeasible,
-    /// A relay with separate links to its neighbours was switched off, and they have reported the loss.
+    /// A relay with separate links was switched off, and its living neighbours have reported the loss.
     Broken,
     /// Every group of relays that receive each other is too small for a quorum.
     NoQuorum,
@@ -171,12 +171,12 @@ pub struct RelayEnd {
 pub struct Watched {
     /// Time when all relays of a view (membership of the chain) first had agreed positions. `None` if they never had.
     pub first_agreement: Option<Instant>,
-    /// Fraction, 0 to 1, of the time since the first agreement in which the chain was available.
+    /// Fraction, 0 to 1, of the time since the first agreed positions in which the chain was available.
     ///
-    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
-    /// without faults. `None` unless the run has a fixed end.
+    /// The chain is available while the longest chain that the living relays can form is at the positions that it would
+    /// reach in a run without faults. `None` unless the run has a fixed end.
     pub availability: Option<f64>,
-    /// Longest outage since the first agreement: a time in which the chain was not available.
+    /// Longest outage since the first agreement on positions: a time in which the chain was not available.
     ///
     /// `None` unless the run has a fixed end.
     pub longest_wrong: Option<Duration>,
@@ -211,7 +211,7 @@ pub struct Outcome {
     pub injected: Injected,
     /// Counts of the attacker's frames by how relays classified them.
     pub attack_counts: AttackCounts,
-    /// Neighbours that relays report as lost at the end, with the time of the report.
+    /// Neighbours that relays report as lost at the end of the run, with the time of the report.
     ///
     /// The key is the reporting relay's number from 1, and the side of the lost neighbour.
     pub noticed: BTreeMap<(u16, Side), Instant>,
@@ -351,7 +351,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Adds a frame that ended at `at`. `note` describes the faults of the frame.
+    /// Adds a frame whose last bit was sent at `at`. `note` describes the faults of the frame.
     pub fn put(&mut self, at: Instant, link: Link, bytes: &[u8], note: String) {
         self.frames.push(Reverse(OnAir {
             at,
@@ -363,7 +363,7 @@ impl Record {
         self.order += 1;
     }
 
-    /// Removes and returns the frames that ended by `until`, in order of time.
+    /// Removes and returns the frames whose last bit was sent at `until` or earlier, in order of time.
     pub fn take(&mut self, until: Instant) -> Vec<OnAir> {
         let mut over = Vec::new();
         while let Some(Reverse(next)) = self.frames.peek()

@@ -14,7 +14,7 @@ use super::drones::Point;
 /// Parameters of a run in which drones with nearly empty batteries are replaced.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationSpec {
-    /// Number of drones that are meant to fly, at most the mission's relays.
+    /// Number of drones that should be in the chain at the same time, at most the mission's relays.
     pub flying: u16,
     /// Time for which a full battery of average capacity lasts in hover, s.
     pub endurance_s: f64,
@@ -97,7 +97,7 @@ pub(super) struct Battery {
 /// Result of a run with replacements.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Rotated {
-    /// Time when the chain of all drones that are meant to fly was first complete and in place.
+    /// Time when the chain first had its full number of drones (`flying`), all of them in place.
     pub complete_at: Option<Instant>,
     /// Time since `complete_at` in which the worst hop's SIR was below [`GOOD`] of the optimum, s.
     pub below_s: f64,
@@ -152,7 +152,7 @@ pub struct NearDrone {
 pub(super) struct Rotation {
     pub(super) spec: RotationSpec,
     pub(super) drones: Vec<Battery>,
-    /// Linear SIR of the worst hop if all drones that are meant to fly are at their best positions.
+    /// Linear SIR of the worst hop if the full number of drones (`flying`) is at the best positions.
     pub(super) best: f64,
     /// Time of the last step of the flight. A queued step at a time before `next` is ignored.
     pub(super) at: Instant,

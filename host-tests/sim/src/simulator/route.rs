@@ -246,7 +246,7 @@ impl Window {
         self.elapsed(until) - self.elapsed(from)
     }
 
-    /// Returns the end of a transmission that needs `duration` of slot time, above 0, from `from` on.
+    /// Returns the end of a transmission that begins at `from` and takes `duration` (> 0) within slots.
     pub fn ends(&self, from: Ps, duration: Ps) -> Ps {
         let due = u128::from(self.elapsed(from)) + u128::from(duration) - 1;
         let open_for = u128::from(self.open_for);
@@ -317,7 +317,7 @@ pub struct Stage {
     pub hops: Vec<Vec<Hop>>,
 }
 
-/// Route of the data through the chain over time, from the first agreement on.
+/// Route of the data through the chain over time, beginning at the first agreement on positions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Route {
     /// Stages, in which no hop changes, in order of time; at least one.
@@ -541,9 +541,9 @@ fn part(time: Ps, share: f64) -> Ps {
     (time as f64 * share) as Ps
 }
 
-/// Returns the route of the data from the first agreement to `until`; `None` if there is no agreement.
+/// Returns the route of the data from the first agreement on positions to the time `until`.
 ///
-/// `relays` is the number of simulated relays.
+/// `None` if there is no agreement. `relays` is the number of simulated relays.
 pub fn route(
     track: &Track,
     true_hops: &TrueHops,

@@ -45,7 +45,7 @@ pub struct TrafficSpec {
     pub queue_packets: usize,
     /// Offered data rates, bit/s: to Rx, then back to Tx.
     ///
-    /// `None` to offer the rates that the planner's formula gives at the first agreement.
+    /// `None` to offer the rates that the planner's formula gives at the positions of the first agreement.
     pub offered_bps: Option<[f64; 2]>,
 }
 
@@ -101,7 +101,7 @@ pub struct Delivery {
 /// Length of a node's packet queue over the time of the traffic.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct QueueLength {
-    /// Number of the node: 0 is Tx, then the relays follow, the last one is Rx.
+    /// Number of the node: 0 for Tx, then the relays from 1, then Rx.
     pub node: usize,
     /// Mean length of the queue over the time of the traffic, packets.
     pub mean: f64,
@@ -114,7 +114,7 @@ pub struct QueueLength {
 pub struct Flow {
     /// End of the traffic in this direction, ps of virtual time.
     pub until: Ps,
-    /// Data rate at the positions of the first agreement by the planner's formula, bit/s.
+    /// Data rate by the planner's formula at the positions of the chain's first agreement, bit/s.
     pub promised_bps: f64,
     /// Data rate of the packets that the source created, bit/s.
     pub offered_bps: f64,
@@ -135,7 +135,7 @@ pub struct Flow {
 /// Data traffic of a run in all its directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Traffic {
-    /// Start of the traffic, which is the first agreement, ps of virtual time.
+    /// Start of the traffic, ps of virtual time: the time of the first agreement on positions.
     pub from: Ps,
     /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
@@ -160,7 +160,7 @@ pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
     delay.map(|delay| *delay as f64 / SECOND)
 }
 
-/// Simulates packets through a chain from its first agreement on; `None` if the relays never agreed.
+/// Simulates packets through a chain after its first agreement on positions; `None` if there was none.
 ///
 /// `outcome` has the recorded states of `relays` relays. After a run that stops at its result, not at a set time, the
 /// traffic goes on in the final state: in each direction for 1000 packets, and 30 more for each hop.

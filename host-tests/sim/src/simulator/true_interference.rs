@@ -43,7 +43,7 @@ pub struct TrueInterference {
 /// Measuring receiver that reports wrong powers from the time `since` on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrokenReceiver {
-    /// Number of the node with the wrong receiver: a relay from 1, 0 for Tx, N + 1 for Rx.
+    /// Number of the node with the broken receiver: 0 for Tx, then the relays from 1, then Rx.
     pub node: u16,
     /// Power that the receiver reports instead of the true power.
     pub reading: BrokenReading,

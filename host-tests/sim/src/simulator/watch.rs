@@ -107,8 +107,8 @@ impl Watch {
 
     /// Records `is_right`: true if the chain counts as available from now on.
     ///
-    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
-    /// without faults.
+    /// The chain is available while the longest chain that the living relays can form is at the positions that it would
+    /// reach in a run without faults.
     pub fn set_available(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);

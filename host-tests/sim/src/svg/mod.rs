@@ -48,7 +48,8 @@ pub fn draw(picture: &Picture) -> String {
 
 /// Returns the scales of the side view's axes.
 ///
-/// The x axis includes the chain and all near interferers. The height axis begins at the ground.
+/// The x axis includes the chain, and all interferers whose x is -0.2 to 1.2 times the distance from Tx to Rx. The
+/// height axis begins at the ground.
 fn frame(picture: &Picture) -> Frame {
     let distance = length(picture);
     let (mut low, mut high, mut top) = (0.0_f64, distance, 0.0_f64);

@@ -385,7 +385,7 @@ fn terrain(
     Ok((Some(report), problem.or(missed)))
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan cannot be flown; `None` if it can.
+/// Returns the terrain below `plan`, and the reason why the plan cannot be flown, if there is one.
 fn over(
     options: &Options,
     elevation: &Elevation,

@@ -137,8 +137,8 @@ const COMMON_TOLERANCE: f64 = 1e-11;
 ///
 /// It is never worse than at the lowest or the highest altitude. The range is scanned, and the three highest maxima are
 /// refined. A maximum that is narrower than the distance of two scanned altitudes may be missed. `None` as for
-/// [`optimum`](super::optimum()), if a relay has a fixed altitude, and for an empty range. The cost is about 120 times
-/// that of [`optimum`](super::optimum()).
+/// [`optimum`](super::optimum()), if a relay has a fixed altitude, or if no altitude is permitted. The cost is about
+/// 120 times that of [`optimum`](super::optimum()).
 pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     let band = scene.band;
     if scene.relays.iter().any(|relay| relay.holds) || !(band.least_m <= band.most_m) {
