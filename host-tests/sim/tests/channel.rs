@@ -79,24 +79,25 @@ fn fifty_agree_at_the_least_baud_with_30_percent_loss() {
     agree_and_hold(50, 0.3, 4);
 }
 
-/// Checks 100 relays on the slowest permitted channel with 30 % loss. It fails at present: after the agreement, the
-/// relays' own requests fill the channel.
+/// Checks 100 relays on the slowest permitted channel with 30 % loss. It fails at present: after the agreement on
+/// positions, requests from the relays fill the channel.
 #[test]
 #[ignore = "fails"]
 fn a_hundred_agree_at_the_least_baud_with_30_percent_loss() {
     agree_and_hold(100, 0.3, 2);
 }
 
-/// Returns the largest permitted number of claims, and echoes of claims, of a relay until `ended`.
+/// Returns the largest permitted number of claims, and of echoes of claims, of a relay until `ended`.
 ///
-/// By claims, relays detect that two of them use the same number. The receiver of a claim sends it back as an echo.
+/// With a claim (a message) a relay claims its number, so that relays detect a number in use twice. The receiver of a
+/// claim sends it back as an echo.
 fn most_claims(ended: Instant) -> u64 {
     let ms = ended.as_micros() / 1_000;
     let first = (1..=6).filter(|k| 250 * ((1 << k) - 1) <= ms);
     2 * (first.count() as u64 + ms / 15_000)
 }
 
-/// Checks that without faults one message along the chain and back is enough for an agreement.
+/// Checks that without faults one message along the chain and back is enough to agree on positions.
 #[test]
 fn without_faults_one_sweep_is_enough() {
     for relays in [2, 8, 50, 100, 200, 300, 600, 1_000] {

@@ -26,7 +26,7 @@ fn of(outcome: &Outcome, what: fn(TimelineEvent) -> bool) -> Vec<(u16, Option<u1
         .collect()
 }
 
-/// Checks the numbers in the reports of a lost neighbour and of the new neighbour beyond it.
+/// Checks the numbers in the reports of a lost neighbour and of the new neighbour in its place.
 ///
 /// Relay 3 of five is switched off, so that relays 2 and 4 report the loss of 3, and then find each other.
 #[test]
@@ -70,7 +70,8 @@ fn a_relay_that_is_not_received_is_reported() {
 
 /// Checks that lost and corrupted frames cause no false reports about other nodes.
 ///
-/// A false report says that a node does not receive this relay, does not have its key, or uses an old epoch.
+/// Such a report says that a node does not receive the reporting relay, has a different key or mission, or uses an old
+/// epoch or a duplicate index.
 #[test]
 fn a_bad_channel_causes_no_false_reports() {
     for seed in 1..=3 {
@@ -131,7 +132,7 @@ pub(crate) struct Air {
     pub(crate) now: Instant,
     /// Events reported so far, each with the index (from 0) of the relay that reported it.
     pub(crate) told: Vec<(usize, Event)>,
-    /// Frames of the ground station that the attacker has withheld. The function `withheld` selects them.
+    /// Frames that the ground station sent and the attacker has withheld. The function `withheld` selects them.
     pub(crate) recorded: Vec<Vec<u8>>,
     pub(crate) withheld: fn(&[u8]) -> bool,
     /// Frames on the air, each with the index (from 0) of its sender; `usize::MAX` if that is no relay.
@@ -278,7 +279,8 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// Checks that the second of two relays with the same number gets no setpoint. Both relays must report the duplicate.
+/// Checks that the relay that joins with the number of an active relay gets no setpoint. Both relays must report the
+/// duplicate.
 ///
 /// Runs `COUNT` chains for each loss rate; `COUNT` is an environment variable.
 #[test]
@@ -449,8 +451,8 @@ fn an_epoch_that_went_back_is_reported_with_the_node() {
 /// Checks a relay that restarts with its old epoch. Its neighbours take it for a duplicate of relay 2.
 ///
 /// At each start a relay draws a random claim number. If the new number is the larger one, the relay takes part at
-/// once. Otherwise it reports a duplicate, and gets no setpoint until its neighbours have received nothing of the old
-/// claim number for `dead_after`.
+/// once. Otherwise it reports a duplicate, and gets no setpoint until its neighbours have received nothing with the
+/// claim number of its previous start for `dead_after`.
 #[test]
 fn with_a_reused_epoch_a_relay_joins_or_reports_and_waits() {
     let mut waited = 0;

@@ -76,7 +76,7 @@ const DIES_S: u64 = 20;
 
 /// Returns the total time, s, in which the chain was not at its best positions after relay 4 was lost.
 ///
-/// `None` if the relays never agreed, or unless the seven remaining relays are in one view at the end.
+/// `None` if the relays never agreed, or if a remaining relay has no view of seven relays at the end.
 fn recovery(outcome: &Outcome) -> Option<f64> {
     let left = || outcome.relays.iter().filter(|relay| relay.killed.is_none());
     // The remaining relays may be forming another view when the run ends.
@@ -156,7 +156,7 @@ fn cuts() -> Vec<Setup> {
     all
 }
 
-/// Returns the first time, `healed` or later, at which all eight relays are in one view.
+/// Returns the first time, not before `healed`, at which all eight relays are in one view.
 fn joined(outcome: &Outcome, healed: Instant) -> Option<Instant> {
     let mut views = [(0, 8); 8];
     for moment in &outcome.moments {
@@ -314,7 +314,7 @@ fn spell(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     (from, span.map(|span| from + Duration::from_millis(span)))
 }
 
-/// Draws a run of three to ten relays with partitions, one-way links, losses, failures and reboots.
+/// Draws a run of 3 to 10 relays with lost frames, partitions, one-way links, failures and reboots.
 fn sequence(seed: u64) -> Setup {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let relays = rng.random_range(3..=10);

@@ -111,7 +111,8 @@ struct Hops<'a> {
 impl Hops<'_> {
     /// Returns the largest signal power that the first and the last hop can both have, W.
     ///
-    /// The hop from Tx has the largest power if the relay is vertically above Tx; the hop to Rx, if it is above Rx.
+    /// The hop from Tx has its largest power if the relay is vertically above Tx. The hop to Rx has its largest power
+    /// if the relay is vertically above Rx.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)

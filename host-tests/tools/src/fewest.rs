@@ -33,7 +33,7 @@ pub struct Fewest {
     pub proven: bool,
 }
 
-/// Highest target SIR that any number of relays meets, and the fewest relays that meet it.
+/// Highest target SIR that a chain of some number of relays meets, and the fewest relays for it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Most {
     /// Highest target SIR that can be met, linear, to 1e-6 relative.
@@ -74,7 +74,7 @@ impl Fewest {
 }
 
 impl Most {
-    /// Returns the highest target SIR that any number of relays meets.
+    /// Returns the highest target SIR that a chain of some number of relays meets.
     ///
     /// `None` if this target is below 1e-20 times the highest possible SIR of the first hop. With different altitudes,
     /// or a minimum separation, the target can be met but may not be the highest. Work: 33 times the work of
@@ -107,7 +107,7 @@ impl Most {
 /// Returns positions at which the mission's N relays meet the SIR `target`, relay 1 first.
 ///
 /// `None` if the relays cannot meet it. All hops except one have their maximum length, and an SIR of `target` with a
-/// relative error of at most 1e-4. Work: at most two chains, each with a reach and a required position for every relay.
+/// relative error of at most 1e-4. Work: at most two computations of every relay's farthest and required x.
 pub fn places(
     mission: &Mission,
     target: f32,
@@ -196,7 +196,8 @@ fn toward_rx(
 
 /// Computes the reach (farthest x, m) of every relay. Calls `visit` with the relay's index and reach.
 ///
-/// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
+/// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target. The slack is the
+/// length by which the last hop could still grow, and is negative if this hop misses the target.
 fn ends<F: Fn(u16) -> Profile>(
     chain: &Walk<'_, F>,
     mut visit: impl FnMut(u16, f32),
@@ -216,7 +217,9 @@ fn closes<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     ends(chain, |_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns true if the relays can meet the target, at their farthest x or at smaller required x.
+/// Returns true if the relays can meet the target.
+///
+/// They may be at their farthest x, or stop at a smaller x that the next hop requires.
 fn is_met<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     closes(chain) && (closes(&chain.plainly()) || chain.place(0).is_some())
 }
@@ -224,7 +227,7 @@ fn is_met<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
 /// Returns positions that meet the target; `None` if there are none.
 ///
 /// First the reach of each relay is computed: the farthest x at which its hop meets the target. Then, from the last
-/// relay back, the x that the next hop requires.
+/// relay back to the first, each relay moves to the x that its next hop requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let mut places = vec![Placement::default(); usize::from(chain.mission.relays())];
@@ -290,12 +293,12 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
         })
 }
 
-/// Returns the highest target SIR that N relays with the same `profile` meet in a field.
+/// Returns the highest target SIR that N relays with the same `profile` meet in an interference field.
 ///
 /// The result is linear, and exact to one f32 step. `None` if the mission has no field, or if no target is met. The
 /// result is the optimum if no minimum separation is binding: `identical_relays_in_a_field_are_optimal` in
-/// `host-tests/tests/fleet/`. In an uneven field the result of Algorithm 4 may be lower. Work: 48 chains, each with
-/// three square roots for every point of the field and relay.
+/// `host-tests/tests/fleet/`. If the field varies along the line, Algorithm 4 may reach a lower SIR. Work: 48 chains,
+/// each with three square roots for every point of the field and relay.
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;
     let met = |target: f32| is_met_by_equals(mission, target, profile);

@@ -270,7 +270,8 @@ impl Family {
     pub const RP2350: Self = Self(0xE48B_FF59);
 }
 
-/// Returns the image as a UF2 file. Bytes of a page that are not in the image have the value of erased flash.
+/// Returns the image as a UF2 file. A page is the content of one block, 256 bytes. Bytes of a page that are not in the
+/// image have the value of erased flash.
 ///
 /// # Errors
 /// The image has more pages than the format can count.

@@ -17,7 +17,7 @@ use super::multi_interferer::optimum;
 
 const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 
-/// Random experiment: relays on a line of 1 km, and interferers. In some runs the relays must locate them.
+/// Random experiment: relays on a line of 1 km, and interferers. In some runs the relays must locate the interferers.
 ///
 /// The interferers have 1 to 100 W. The interferers are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D; D is the
 /// distance from Tx to Rx.
@@ -125,7 +125,7 @@ impl RandomScene {
 
     /// Returns a simulation of drones that fly at 10 m/s, and measure the interference every second.
     ///
-    /// They start beside Tx. `guess` is the interference that the relays assume before the first measurement.
+    /// The drones start beside Tx. `guess` is the interference that the relays assume before the first measurement.
     pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = self.setup(guess)?;
         let start = (1..=self.relays)

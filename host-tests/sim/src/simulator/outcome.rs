@@ -25,7 +25,7 @@ pub enum TimelineEvent {
     Booted,
     /// The relay lost its neighbour at this side, toward Tx or toward Rx.
     Lost(Side),
-    /// The relay receives a new neighbour at this side (toward Tx or Rx), or a lost neighbour again.
+    /// A lost or a new neighbour is received at this side of the relay, toward Tx or toward Rx.
     Found(Side),
     /// The relay accepted a new view: a new membership of the chain.
     ViewAccepted {
@@ -40,19 +40,19 @@ pub enum TimelineEvent {
     },
     /// The relay found that too few relays reach each other for a quorum, so no view can form.
     NoQuorum,
-    /// The relay's lease expired: the relay may no longer rely on the last agreement.
+    /// The relay's lease expired: the relay may no longer rely on the last agreement on positions.
     LeaseLapsed,
     /// A node reports that it does not receive this relay.
     NotHeard,
-    /// The relay found that a node's mission is not the relay's own.
+    /// The relay found that a second node has a different mission.
     MissionMismatch,
     /// The relay found that a node does not sign its frames with the relay's key.
     KeyMismatch,
     /// The relay found that a node's epoch, the counter of that node's starts, went back.
     EpochWentBack,
-    /// Two nodes use the index [`Moment::other`], which is this relay's index or a neighbour's.
+    /// Two nodes use the same index, given in [`Moment::other`]. It is this relay's index or a neighbour's.
     DuplicateIndex,
-    /// The relay accepted its position in an agreement of the chain.
+    /// The chain agreed on positions, and this relay accepted its position.
     Converged,
     /// The leader found that the chain can meet no target SIR.
     Infeasible,
@@ -64,7 +64,8 @@ pub enum TimelineEvent {
     Deaf,
     /// The relay receives the node [`Moment::other`] again.
     Hears,
-    /// A ground station offers a mission of this version. Tx counts as relay 0, Rx as the relay after the last.
+    /// A ground station offers a mission of this version. [`Moment::relay`] is 0 for the station at Tx, and the number
+    /// of relays plus 1 for the station at Rx.
     Offered(u16),
     /// The relay stored an uploaded mission of this version.
     Uploaded(u16),
@@ -82,11 +83,11 @@ pub enum TimelineEvent {
     NewEstimate,
     /// The relay found that the measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The relay found that the measurements of one node do not agree with those of all other nodes.
+    /// The relay found that the measurements of one node do not fit those of the remaining nodes.
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
-    /// The relay's drone has to fly home. Logged for each value of the endurance that requires this.
+    /// The relay's drone has to fly home. Logged at each new value of the remaining endurance that requires this.
     MustLeave,
     /// The relay informed a node outside of the chain that its drone may fly away.
     MayLeaveTold,
@@ -97,11 +98,11 @@ pub enum TimelineEvent {
 pub struct Moment {
     /// Time of the event in the run.
     pub at: Instant,
-    /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
+    /// Number of the node that the entry is about: 0 for Tx, then the relays from 1, then Rx.
     pub relay: u16,
     /// Kind of the event, with its data.
     pub what: TimelineEvent,
-    /// Second node that the event concerns, such as a lost neighbour, by number from 1.
+    /// Number, from 1, of a second node that the event concerns, such as a lost neighbour.
     pub other: Option<u16>,
     /// Linear target SIR of the relay's position at this time; `None` without a target.
     pub target: Option<f32>,
@@ -114,15 +115,16 @@ pub struct Moment {
 /// Reason for the end of a simulated run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Ending {
-    /// Every relay of the chain has a position, all for the same target SIR.
+    /// All relays of the chain have positions, computed for the same target SIR.
     Settled,
     /// The leader found that the chain can meet no target SIR.
     Infeasible,
-    /// Relays on separate links went silent, and all their neighbours have noticed.
+    /// A relay with separate links was switched off, and its living neighbours have reported the loss.
     Broken,
     /// Every group of relays that receive each other is too small for a quorum.
     NoQuorum,
-    /// The planned end of the run or of its measurements was reached. See [`Setup::soak`](super::setup::Setup::soak).
+    /// The fixed end of the run or its last measurement of the interference was reached. See
+    /// [`Setup::soak`](super::setup::Setup::soak).
     Soaked,
     /// The deadline of the run, or the limit on its number of events, was reached.
     #[default]
@@ -136,10 +138,10 @@ pub struct RelayEnd {
     pub setpoint: Option<Placement>,
     /// Linear target SIR of the setpoint; `None` without a target.
     pub target: Option<f32>,
-    /// Upper bound, linear, on the SIR of all chains at the relays' altitudes. Known only at the leader, otherwise
-    /// `None`.
+    /// Upper bound, linear, on the worst hop's SIR at the relays' altitudes, for any x. Known only at the leader,
+    /// otherwise `None`.
     pub bound: Option<f32>,
-    /// Shares of the frame time for the relay's fitted slots; `None` with equal slots.
+    /// Fitted slots (as long as each hop needs) of the hops next to the relay; `None` with equal slots.
     pub slot_shares: Option<SlotShares>,
     /// Altitude and transmit power of the relay.
     pub profile: Profile,
@@ -169,16 +171,16 @@ pub struct RelayEnd {
 pub struct Watched {
     /// Time when all relays of a view (membership of the chain) first had agreed positions. `None` if they never had.
     pub first_agreement: Option<Instant>,
-    /// Fraction, 0 to 1, of the time since the first agreement in which the chain was available.
+    /// Fraction, 0 to 1, of the time since the first agreed positions in which the chain was available.
     ///
-    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
-    /// without faults. `None` unless the run has a fixed end.
+    /// The chain is available while the longest chain that the living relays can form is at the positions that it would
+    /// reach in a run without faults. `None` unless the run has a fixed end.
     pub availability: Option<f64>,
-    /// Longest outage since the first agreement: a time in which the chain was not available.
+    /// Longest outage since the first agreement on positions: a time in which the chain was not available.
     ///
     /// `None` unless the run has a fixed end.
     pub longest_wrong: Option<Duration>,
-    /// Largest number of groups of relays that flew at the same time, each by its own agreement.
+    /// Largest number of relay groups that flew at the same time by separate agreements on positions.
     pub most_flying: usize,
     /// Minimum distance between two relays during the run, m. The distance is between their drones if drones are
     /// simulated, otherwise between their setpoints.
@@ -203,13 +205,13 @@ pub struct Outcome {
     pub bytes: u64,
     /// Virtual time when the run ended.
     pub ended: Instant,
-    /// Record of the replacements; `None` without a fleet larger than its chain.
+    /// Record of the replacements of drones; `None` if the run replaces no drones.
     pub rotated: Option<Rotated>,
     /// Counts of the frame faults that the links caused.
     pub injected: Injected,
     /// Counts of the attacker's frames by how relays classified them.
     pub attack_counts: AttackCounts,
-    /// Neighbours that relays report as lost at the end, with the time of the report.
+    /// Neighbours that relays report as lost at the end of the run, with the time of the report.
     ///
     /// The key is the reporting relay's number from 1, and the side of the lost neighbour.
     pub noticed: BTreeMap<(u16, Side), Instant>,
@@ -222,8 +224,8 @@ pub struct Outcome {
     pub nearest_lent: Option<Nearest>,
     /// Smallest margin during the run, m: the distance of two drones minus the required distance.
     ///
-    /// Only drones in flight that no pilot controls count. The required distance is the mission's separation, or the
-    /// distance between the drones when their pilots last handed them over, if that is smaller. Infinite if no pair
+    /// Only drones in flight that no pilot controls count. The required distance of two drones is the mission's
+    /// separation or their distance at the last handover by their pilots, whichever is smaller. Infinite if no pair
     /// counted.
     pub margin_m: f64,
     /// Relays that forward data at each time step: number from 1, and true position of the drone.
@@ -235,11 +237,11 @@ pub struct Outcome {
     pub margin_at: Option<Nearest>,
     /// Number of position targets that relays sent while the autopilot accepts none, such as on the ground.
     ///
-    /// Targets up to 1.5 s after the change of the state do not count. Nonzero is a bug.
+    /// Targets up to 1.5 s after a change of the autopilot's flight mode or state do not count. Nonzero is a bug.
     pub stray_targets: u64,
     /// Final position of each drone with an autopilot, and a flag: true if the relay controls the drone.
     ///
-    /// The position is relative to the line of the relay's mission, which an upload may move.
+    /// The position is relative to the line Tx-Rx of the relay's mission. An upload of a mission may move this line.
     pub fleet: Vec<(Point, bool)>,
     /// Number of setpoints outside of the mission's limits. Nonzero is a bug.
     pub unsafe_setpoints: u64,
@@ -349,7 +351,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Adds a frame that ended at `at`. `note` describes the faults of the frame.
+    /// Adds a frame whose last bit was sent at `at`. `note` describes the faults of the frame.
     pub fn put(&mut self, at: Instant, link: Link, bytes: &[u8], note: String) {
         self.frames.push(Reverse(OnAir {
             at,
@@ -361,7 +363,7 @@ impl Record {
         self.order += 1;
     }
 
-    /// Removes and returns the frames that ended by `until`, in order of time.
+    /// Removes and returns the frames whose last bit was sent at `until` or earlier, in order of time.
     pub fn take(&mut self, until: Instant) -> Vec<OnAir> {
         let mut over = Vec::new();
         while let Some(Reverse(next)) = self.frames.peek()

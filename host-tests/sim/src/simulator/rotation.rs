@@ -11,10 +11,10 @@ use uav_relay::{Duration, Instant};
 
 use super::drones::Point;
 
-/// Parameters of a run in which drones with tired batteries are replaced.
+/// Parameters of a run in which drones with nearly empty batteries are replaced.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RotationSpec {
-    /// Number of drones that are meant to fly, at most the mission's relays.
+    /// Number of drones that should be in the chain at the same time, at most the mission's relays.
     pub flying: u16,
     /// Time for which a full battery of average capacity lasts in hover, s.
     pub endurance_s: f64,
@@ -22,7 +22,9 @@ pub struct RotationSpec {
     pub spread: f64,
     /// Time on the ground until a drone has a full battery again, s.
     pub ground_s: f64,
-    /// True if tired drones announce that they leave; false if they just fly home, as an ordinary loss.
+    /// True if relays request to leave the chain before their drones fly home to recharge.
+    ///
+    /// If false, the drones fly home unannounced, and the chain loses their relays.
     pub announced: bool,
     /// Bound on each drone's constant position error per axis, m.
     pub bias_m: f64,
@@ -43,7 +45,7 @@ pub fn duration(span_s: f64) -> Duration {
 /// Remaining endurance that a drone must still have when it lands, s.
 pub const RESERVE_S: f64 = 180.0;
 
-/// Fraction of the optimum of the SIR below which the chain counts as degraded.
+/// Fraction of the best possible SIR below which the chain counts as degraded.
 pub const GOOD: f64 = 0.99;
 
 /// Energy consumption of a moving drone, as a multiple of the consumption in hover.
@@ -81,7 +83,7 @@ pub(super) struct Battery {
     pub(super) requested: Option<Instant>,
     /// Flight corridor ("tube") for take-offs that the drone uses; `None` if it uses none.
     ///
-    /// The drone uses it from take-off until it is settled in the chain.
+    /// The drone uses it from take-off until it has come close to its agreed position in the chain (`is_settled`).
     pub(super) tube: Option<usize>,
     /// Time from which the spare has hovered at its waiting place.
     pub(super) hovers_since: Instant,
@@ -95,7 +97,7 @@ pub(super) struct Battery {
 /// Result of a run with replacements.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Rotated {
-    /// Time when the chain of all drones that are meant to fly was first complete and in place.
+    /// Time when the chain first had its full number of drones (`flying`), all of them in place.
     pub complete_at: Option<Instant>,
     /// Time since `complete_at` in which the worst hop's SIR was below [`GOOD`] of the optimum, s.
     pub below_s: f64,
@@ -107,15 +109,15 @@ pub struct Rotated {
     pub replaced: u32,
     /// Number of relays, among `replaced`, that left without permission, at the end of their endurance.
     pub forced: u32,
-    /// Total time that the batteries allowed in the chain, s, over all relays that left.
+    /// Total time, s, for which the batteries would have let the relays that left stay in the chain.
     ///
-    /// A battery allows a relay to stay until only the reserve and the way home remain.
+    /// A relay can stay until its battery holds only the reserve and the energy for the way home.
     pub possible_s: f64,
     /// Longest time from a relay's request to leave until it left, s.
     pub longest_wait_s: f64,
     /// Sum of the times from each relay's request to leave until it left, s.
     pub waits_s: f64,
-    /// Least remaining endurance beyond the way home, s, of a drone when it left the chain.
+    /// Smallest remaining endurance after the way home, s, computed for each drone when it left the chain.
     pub least_left_s: Option<f64>,
     /// Closest approach of two drones in the air since the start.
     pub nearest: Option<Encounter>,
@@ -137,7 +139,7 @@ pub struct Encounter {
 pub struct NearDrone {
     /// Number of the drone's relay.
     pub relay: usize,
-    /// Activity of the drone, departure state of its relay, and reasons why its setpoint is held.
+    /// Activity of the drone, departure state of its relay, and the guard's reasons to hold the drone back.
     pub state: String,
     /// True position: x, y and altitude, m.
     pub at_m: Point,
@@ -150,9 +152,9 @@ pub struct NearDrone {
 pub(super) struct Rotation {
     pub(super) spec: RotationSpec,
     pub(super) drones: Vec<Battery>,
-    /// Linear SIR of the worst hop if all drones that are meant to fly are at their best positions.
+    /// Linear SIR of the worst hop if the full number of drones (`flying`) is at the best positions.
     pub(super) best: f64,
-    /// Time of the last step of the flight. The time of the next step is `next`; other queued steps are ignored.
+    /// Time of the last step of the flight. A queued step at a time before `next` is ignored.
     pub(super) at: Instant,
     pub(super) next: Instant,
     pub(super) pilots_at: Instant,
@@ -169,7 +171,7 @@ pub(super) struct Rotation {
 impl Rotation {
     /// Returns the lowest free flight corridor ("tube").
     ///
-    /// Returns have corridors of their own: `home` is true for them, and false for take-offs.
+    /// If `home` is true, it is a corridor for flights home, otherwise for take-offs. The two kinds are separate.
     pub(super) fn free_tube(&self, home: bool) -> usize {
         let is_used = |tube: usize| {
             self.drones.iter().any(|drone| match &drone.duty {
@@ -236,7 +238,7 @@ impl Rotation {
         time_s
     }
 
-    /// Returns the time, s, until drone `index` (from 0) at `at` has to fly home; negative if it is late.
+    /// Returns the time, s, until drone `index` (from 0) at `at` has to fly home; negative after that time.
     pub(super) fn left_s(&self, index: usize, at: Point) -> f64 {
         let Some(drone) = self.drones.get(index) else {
             return 0.0;

@@ -128,7 +128,7 @@ impl Track {
 pub struct TrueHops {
     /// Relays and interferers at time 0, and the interferers' velocity along x and y, m/s.
     ///
-    /// `None` in a random field and in a run with uploads.
+    /// `None` if the interference is a random field (distributions of its power along the line), or with uploads.
     scene: Option<(Scene, [f64; 2])>,
     /// Missions by version, used if `scene` is `None`. Version 0 is the mission at the start of the run.
     missions: Vec<(u16, Mission)>,
@@ -139,8 +139,9 @@ pub struct TrueHops {
 impl TrueHops {
     /// Prepares the computation of true SIRs for a run of `setup` whose relays have `mission` at the start.
     ///
-    /// The interference is from all interferers of `scenario`, which may move. In a random field, and in a run with
-    /// uploads, it is the interference of the mission that the chain flies.
+    /// The interference is from all interferers of `scenario`, which may move. In a random field (distributions of the
+    /// interference power along the line), and in a run with uploads, it is the interference of the mission that the
+    /// chain flies.
     pub fn new(scenario: &Scenario, setup: &Setup, mission: &Mission) -> Self {
         let relays = mission.relays();
         let moved = setup
@@ -245,7 +246,7 @@ impl Window {
         self.elapsed(until) - self.elapsed(from)
     }
 
-    /// Returns the end of a transmission that needs `duration` of slot time, above 0, from `from` on.
+    /// Returns the end of a transmission that begins at `from` and takes `duration` (> 0) within slots.
     pub fn ends(&self, from: Ps, duration: Ps) -> Ps {
         let due = u128::from(self.elapsed(from)) + u128::from(duration) - 1;
         let open_for = u128::from(self.open_for);
@@ -316,7 +317,7 @@ pub struct Stage {
     pub hops: Vec<Vec<Hop>>,
 }
 
-/// Route of the data through the chain over time, from the first agreement on.
+/// Route of the data through the chain over time, beginning at the first agreement on positions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Route {
     /// Stages, in which no hop changes, in order of time; at least one.
@@ -340,8 +341,8 @@ struct Members {
 }
 
 impl Members {
-    /// Returns the relays of the view that most living relays have accepted. If there are several such views, it is the
-    /// newest.
+    /// Returns the relays of the view that the largest number of living relays have accepted. Of views with equal
+    /// numbers, the newest is chosen.
     fn of(states: &BTreeMap<usize, RelayState>) -> Option<Self> {
         let on = || states.iter().filter(|(_, state)| state.observed.is_on);
         let mut counts: BTreeMap<(ViewId, u16), usize> = BTreeMap::new();
@@ -540,9 +541,9 @@ fn part(time: Ps, share: f64) -> Ps {
     (time as f64 * share) as Ps
 }
 
-/// Returns the route of the data from the first agreement to `until`; `None` if there is no agreement.
+/// Returns the route of the data from the first agreement on positions to the time `until`.
 ///
-/// `relays` is the number of simulated relays.
+/// `None` if there is no agreement. `relays` is the number of simulated relays.
 pub fn route(
     track: &Track,
     true_hops: &TrueHops,

@@ -15,7 +15,7 @@ use super::medium::Access;
 use super::rotation::RotationSpec;
 use super::true_interference::TrueInterference;
 
-/// Period in which relays 1 to `after` and the relays beyond `after` do not receive each other.
+/// Period in which relays 1 to `after` and relays `after` + 1 to N do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Partition {
     /// Number, from 1, of the relay after which the partition cuts the chain.
@@ -52,7 +52,7 @@ pub struct Channel {
     pub baud: u32,
     /// Largest number of relays within radio range of one relay, including that relay itself.
     ///
-    /// It is 1 for separate lines.
+    /// It is 1 if each pair of neighbours has a separate link.
     pub in_range: usize,
     /// Time on the air that a frame takes in addition to its bytes, as a number of bytes.
     pub overhead: usize,
@@ -70,9 +70,9 @@ const KEYS: u64 = 1;
 pub struct Setup {
     /// Mission that every relay has loaded at the start.
     pub mission: Mission,
-    /// Altitude and power of relays that differ from the mission's common ones, by number from 1.
+    /// Relays without the mission's common altitude or power: number from 1, altitude and power.
     pub profiles: Vec<(u16, Profile)>,
-    /// Numbers, from 1, of relays that keep their altitude when methods choose altitudes.
+    /// Numbers, from 1, of relays that keep their altitude even if the placement method chooses altitudes.
     pub held: Vec<u16>,
     /// Settings of every relay. The simulator sets `hop_time`, `hold_altitude` and `profile` for each relay.
     ///
@@ -86,7 +86,7 @@ pub struct Setup {
     pub kills: Vec<(u16, Instant)>,
     /// Relays that reboot: number from 1 and time.
     ///
-    /// A relay keeps only what it has stored: an uploaded mission, and its record of votes on views.
+    /// A relay keeps only what it has stored: an uploaded mission, and its votes on views (memberships of the chain).
     pub boots: Vec<(u16, Instant)>,
     /// Relays that request to leave the chain: number from 1, time, and remaining endurance, s, if known.
     ///
@@ -96,7 +96,7 @@ pub struct Setup {
     pub stays: Vec<(u16, Instant)>,
     /// Reserve of endurance at which relays request to leave by themselves; `None` if they do not.
     pub reserve: Option<Duration>,
-    /// Values of a drone's remaining endurance beyond the way home, as given to its relay.
+    /// Values of a drone's remaining endurance after the way home, as given to its relay.
     ///
     /// Each entry has the relay's number from 1, the time, and the endurance, s.
     pub endurances: Vec<(u16, Instant, u16)>,
@@ -108,8 +108,8 @@ pub struct Setup {
     pub auth: bool,
     /// Uploads of missions during the run. If `auth` is false, no upload takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
-    /// Ends of the chain whose ground stations request reports from the relays, each with its start. If `auth` is
-    /// false, no station requests reports.
+    /// Ends of the chain whose ground stations request reports from the relays. Each has the time at which the requests
+    /// begin. If `auth` is false, no station requests reports.
     pub watches: Vec<(Side, Instant)>,
     /// Numbers, from 1, of relays that lose an uploaded mission at a reboot.
     pub forgetful: Vec<u16>,
@@ -119,7 +119,8 @@ pub struct Setup {
     pub flight: Option<FlightSpec>,
     /// Flight of drones with simulated autopilots, in place of `flight`; `None` if it is not simulated.
     pub fleet: Option<FleetSpec>,
-    /// Replacement of tired drones, in place of `flight` and `fleet`; `None` if it is not simulated.
+    /// Replacement of drones with nearly empty batteries; `None` if it is not simulated. It takes the place of `flight`
+    /// and `fleet`.
     pub rotation: Option<RotationSpec>,
     /// Radio range on a shared channel, in relays. Relays receive each other if their numbers differ by at most this.
     pub radio_reach: usize,
@@ -133,7 +134,7 @@ pub struct Setup {
     pub deaf: Vec<OneWayFailure>,
     /// True interferers, which relays measure and have to locate; `None` if relays do not measure them.
     pub true_interference: Option<TrueInterference>,
-    /// Fixed end of the run; `None` to end the run when the chain settles.
+    /// Fixed end of the run; `None` to end the run at its result, such as agreed positions of all relays.
     ///
     /// With a fixed end, the run measures the availability of the chain.
     pub soak: Option<Instant>,
@@ -237,7 +238,8 @@ impl Setup {
 
     /// Returns the load of the shared channel: the number of relays in radio range, and a frame's overhead.
     ///
-    /// `None` if senders do not interfere with each other: on separate lines and on an ideal channel.
+    /// `None` if senders do not interfere with each other: on separate links between neighbours, and on an ideal
+    /// channel.
     pub fn load(&self) -> Option<ChannelLoad> {
         let shared = self.settings.wiring == Wiring::Shared && self.access != Access::Ideal;
         let Channel {

@@ -24,8 +24,8 @@ use std::fmt;
 use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
-/// Number of packets that are sent after the end of a run, if the run ends by itself. The data rates that the report
-/// states are then averages over many packets.
+/// Number of packets that are sent after the end of a run that stops at its result, not at a set time. The data rates
+/// in the report are then averages over many packets.
 const AFTER: usize = 1_000;
 /// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;
@@ -45,7 +45,7 @@ pub struct TrafficSpec {
     pub queue_packets: usize,
     /// Offered data rates, bit/s: to Rx, then back to Tx.
     ///
-    /// `None` to offer the rates that the planner's formula gives at the first agreement.
+    /// `None` to offer the rates that the planner's formula gives at the positions of the first agreement.
     pub offered_bps: Option<[f64; 2]>,
 }
 
@@ -101,7 +101,7 @@ pub struct Delivery {
 /// Length of a node's packet queue over the time of the traffic.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct QueueLength {
-    /// Number of the node: 0 is Tx, then the relays follow, the last one is Rx.
+    /// Number of the node: 0 for Tx, then the relays from 1, then Rx.
     pub node: usize,
     /// Mean length of the queue over the time of the traffic, packets.
     pub mean: f64,
@@ -114,7 +114,7 @@ pub struct QueueLength {
 pub struct Flow {
     /// End of the traffic in this direction, ps of virtual time.
     pub until: Ps,
-    /// Data rate at the positions of the first agreement by the planner's formula, bit/s.
+    /// Data rate by the planner's formula at the positions of the chain's first agreement, bit/s.
     pub promised_bps: f64,
     /// Data rate of the packets that the source created, bit/s.
     pub offered_bps: f64,
@@ -135,7 +135,7 @@ pub struct Flow {
 /// Data traffic of a run in all its directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Traffic {
-    /// Start of the traffic, which is the first agreement, ps of virtual time.
+    /// Start of the traffic, ps of virtual time: the time of the first agreement on positions.
     pub from: Ps,
     /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
@@ -160,10 +160,10 @@ pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
     delay.map(|delay| *delay as f64 / SECOND)
 }
 
-/// Simulates packets through a chain from its first agreement on; `None` if the relays never agreed.
+/// Simulates packets through a chain after its first agreement on positions; `None` if there was none.
 ///
-/// `outcome` has the recorded states of `relays` relays. After a run that ends by itself, the traffic goes on in the
-/// final state: in each direction for 1000 packets, and 30 more for each hop.
+/// `outcome` has the recorded states of `relays` relays. After a run that stops at its result, not at a set time, the
+/// traffic goes on in the final state: in each direction for 1000 packets, and 30 more for each hop.
 ///
 /// # Errors
 /// [`TrafficError`] if the traffic is too much to simulate.
@@ -249,14 +249,15 @@ struct Queue {
     packets: VecDeque<Ps>,
     /// Hop on which the node sends; `None` while it cannot send.
     hop: Option<Hop>,
-    /// Slot time that the first packet still needs, ps, as of `since`; 0 before its transmission starts.
+    /// Time in the hop's slots, ps, that the first packet still needed at the time `since`. It is 0 before the packet's
+    /// transmission starts.
     rest: Ps,
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends of transmissions with a different number are out of
     /// date, and are ignored.
     number: u32,
-    /// Integral of the queue's length over time until `counted`, in packets times ps. The report computes the mean
-    /// length from it.
+    /// Integral of the queue's length over time, up to the time `counted`, in packets times ps. The mean length in the
+    /// report is computed from it.
     sum: u128,
     counted: Ps,
     most: usize,

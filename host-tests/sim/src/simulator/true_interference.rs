@@ -22,8 +22,8 @@ pub struct TrueInterference {
     pub period: Duration,
     /// True if a relay measures only once at each of its positions.
     pub once: bool,
-    /// Samples that relays get instead of measurements: the relay's number from 1, and the sample. They get them at
-    /// the time of the first measurement.
+    /// Samples that relays get instead of measurements: the relay's number from 1, and the sample. Relays get these
+    /// samples at the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
     /// Measuring receivers that report wrong powers.
     pub broken: Vec<BrokenReceiver>,
@@ -31,8 +31,8 @@ pub struct TrueInterference {
     pub ends_during: [Instant; 2],
     /// True if Tx and Rx measure the interference, too.
     ///
-    /// If there is a network key, they send the results by radio. Otherwise only the measurement at Rx arrives, by a
-    /// wire to the last relay.
+    /// With a network key, Tx and Rx send their results by radio. Without a key, only the result of Rx arrives: by a
+    /// wire from Rx to the last relay.
     pub ends: bool,
     /// Time of the last measurement, which ends the run.
     pub until: Instant,
@@ -43,7 +43,7 @@ pub struct TrueInterference {
 /// Measuring receiver that reports wrong powers from the time `since` on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrokenReceiver {
-    /// Number of the node with the wrong receiver: a relay from 1, 0 for Tx, N + 1 for Rx.
+    /// Number of the node with the broken receiver: 0 for Tx, then the relays from 1, then Rx.
     pub node: u16,
     /// Power that the receiver reports instead of the true power.
     pub reading: BrokenReading,

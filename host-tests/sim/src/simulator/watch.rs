@@ -48,7 +48,8 @@ impl Watch {
         }
     }
 
-    /// Counts the time since the last call as available or as outage. No state must have changed in that time.
+    /// Adds the time since the last call to the available time or to the outage. The last call of `set_available`
+    /// decides which. Adds nothing before the first agreement on positions.
     pub fn count_time(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
@@ -95,8 +96,8 @@ impl Watch {
         }
     }
 
-    /// Updates the number of relay groups with separate agreements, and the time of the first agreement. All changes of
-    /// states at `now` must be recorded before.
+    /// Updates the largest number of relay groups with separate agreements, and the time of the first one. The
+    /// agreements are on positions. Changes of states at `now` must be recorded before this call.
     pub fn count_groups(&mut self, now: Instant) {
         self.most_flying = self.most_flying.max(groups(&self.states));
         if self.first.is_none() && has_agreed(&self.states) {
@@ -106,8 +107,8 @@ impl Watch {
 
     /// Records `is_right`: true if the chain counts as available from now on.
     ///
-    /// The chain is available while the longest chain that the living relays can form is at the positions of a run
-    /// without faults.
+    /// The chain is available while the longest chain that the living relays can form is at the positions that it would
+    /// reach in a run without faults.
     pub fn set_available(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);
@@ -143,7 +144,7 @@ pub struct ObservedState {
     pub phase: Phase,
     /// View of the relay: the membership of the chain that it has accepted.
     pub view: ViewId,
-    /// True while the relay may rely on the last agreement: its lease is valid by the relay's clock.
+    /// True while the relay may rely on the last agreement on positions. Its lease is then valid by the relay's clock.
     pub leased: bool,
     /// Number of relays in the relay's view (membership of the chain).
     pub relays: u16,
@@ -197,7 +198,7 @@ pub fn groups(seen: &[ObservedState]) -> usize {
     claims.sum()
 }
 
-/// Returns true if there is a view whose relays all have positions for the same target SIR.
+/// Returns true if there is a view whose relays all have positions, computed for the same target SIR.
 pub fn has_agreed(seen: &[ObservedState]) -> bool {
     seen.iter().filter(|one| one.is_on).any(|one| {
         let same = |other: &&ObservedState| {

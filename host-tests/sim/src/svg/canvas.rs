@@ -239,7 +239,7 @@ impl Scale {
         (self.from.0..=self.from.1).contains(&value)
     }
 
-    /// Returns at most about `most` round values for the ticks of an axis, and their number of decimals.
+    /// Returns round values for the ticks of an axis, at most `most` + 1, and their number of decimals.
     fn ticks(&self, most: f64) -> (Vec<f64>, usize) {
         let step = round_step((self.from.1 - self.from.0) / most);
         let first = (self.from.0 / step).ceil();

@@ -16,10 +16,10 @@ use picture::{
 pub use picture::{LateralView, OtherInterferers, Picture, lateral_view};
 use sources::{diamond, has_beside};
 
-/// Draws the chain as an SVG document: from the side and, if useful, from above.
+/// Draws the chain as an SVG document: from the side and, if `lateral_view` is given, from above.
 ///
-/// Numbers that would overlap are omitted, but every hop and relay has a tooltip. The work is at most quadratic in
-/// the number of relays.
+/// Numbers that would overlap are omitted, but every hop and relay has a tooltip. The work is at most quadratic in the
+/// number of relays.
 #[must_use]
 pub fn draw(picture: &Picture) -> String {
     let frame = frame(picture);
@@ -48,7 +48,8 @@ pub fn draw(picture: &Picture) -> String {
 
 /// Returns the scales of the side view's axes.
 ///
-/// The x axis includes the chain and all near interferers. The height axis begins at the ground.
+/// The x axis includes the chain, and all interferers whose x is -0.2 to 1.2 times the distance from Tx to Rx. The
+/// height axis begins at the ground.
 fn frame(picture: &Picture) -> Frame {
     let distance = length(picture);
     let (mut low, mut high, mut top) = (0.0_f64, distance, 0.0_f64);
@@ -135,10 +136,10 @@ const SIZE: f64 = 10.0;
 /// An interferer farther away is an arrow at the edge.
 const FARTHEST: f64 = 2.0;
 
-/// Lateral extent of the view from above toward an interferer that is too far away to show.
+/// Lateral size of the view from above, toward an arrow that stands for a distant interferer.
 ///
-/// The extent is a fraction of the distance from Tx to Rx, and leaves space for an arrow. It is used if relays must
-/// stay on the line, because the view then shows no lateral limits.
+/// The size is a fraction of the distance from Tx to Rx, and leaves space for the arrow. It is used if relays must stay
+/// on the line, because the view then shows no lateral limits.
 const TOWARD_FAR: f64 = 0.4;
 
 /// Draws the view from above. `side` has the scale of x in the side view; `view` has the relays' lateral offsets.
@@ -267,10 +268,10 @@ fn draw_legend(canvas: &mut Canvas, picture: &Picture) {
 
 const STRIP: f64 = 84.0;
 
-/// Distance of the line of events from the bottom of the legend, in picture units.
+/// Distance of the horizontal line with the events from the bottom of the legend, in picture units.
 const LINE: f64 = 48.0;
 
-/// Distance of the first and the last event from the picture's left and right edge, in picture units.
+/// Space to the left of the first event and to the right of the last event, in picture units.
 const MARGIN: f64 = 52.0;
 
 /// Largest number of events in a picture. If there are more, the middle events are merged.

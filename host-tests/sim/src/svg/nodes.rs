@@ -252,9 +252,9 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
 
 /// Returns possible positions for the text with a hop's SIR, the best first.
 ///
-/// Each position has a point on the hop, to which a line can lead. `width` and `height` are the size of the text.
-/// `shares` are the points as fractions of the hop's length; `sides` are additional distances from the hop, whose sign
-/// selects the side.
+/// Each entry has a point on the hop, to which a line can lead, and the text's position. The text has the size `width`
+/// by `height`. `shares` are the points as fractions of the hop's length; `sides` are additional distances from the
+/// hop, whose sign selects the side.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);

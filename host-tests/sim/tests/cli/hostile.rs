@@ -106,8 +106,8 @@ fn the_larger_of_two_parts_goes_on_until_they_merge() {
     assert_eq!(healed["sir"], json("")["sir"]);
 }
 
-/// Checks that the leader, relay 1 of two relays, keeps a quorum if relay 2 fails. If relay 1 fails, relay 2 has no
-/// quorum.
+/// Checks that a lost quorum gives the exit status 1. Of two relays, relay 2 alone has no quorum; relay 1, the leader,
+/// has a quorum without relay 2.
 #[test]
 fn too_few_relays_with_positions_give_status_1() {
     let output = chain("--json --uavs 2 --kill 1@20");
@@ -240,7 +240,7 @@ fn an_overloaded_channel_is_refused_before_flight() {
 
 /// Checks that a channel that is too slow for fifty relays in range of each other is rejected.
 ///
-/// The error names settings that would suffice. With the longer `probe_after` that it names, the run is accepted.
+/// The error names settings that would suffice. With the longer `probe_after` from the error, the run is accepted.
 #[test]
 fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
@@ -353,7 +353,7 @@ fn relays_spread_for_measuring_have_no_sir_in_the_picture() {
     assert!(!svg.contains("SIR 0.000"), "{svg}");
 }
 
-/// Checks that a report's true and optimum SIR are computed without a lost relay.
+/// Checks that a report's true and optimum SIR are those of the remaining relays after a relay is lost.
 #[test]
 fn a_lost_relay_does_not_count_in_the_status() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";

@@ -101,7 +101,8 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
     assert_eq!(table.lines().count(), 1 + 8 + 1 + 2, "{table}");
 }
 
-/// Checks that the table has a y column if relays may leave the line. `altitude` is an alias of `joint`.
+/// Checks that the table has a y column if relays may leave the line. The test selects the method `joint` by its alias
+/// `altitude`.
 #[test]
 fn the_table_has_y_if_lateral_offsets_are_allowed() {
     let side = example("side.toml");

@@ -33,7 +33,7 @@ fn the_report_of_the_traffic_in_words() {
     insta::assert_snapshot!(text);
 }
 
-/// Checks the promised data rate and the delivered data rate against the formula. The test computes the formula by itself.
+/// Checks the promised and the delivered data rate against bandwidth * log2(1 + SIR) / number of slots.
 #[test]
 fn the_promised_rate_is_delivered() {
     for (more, slots) in [("", 9.0), ("--offer-bps 1e9", 9.0)] {

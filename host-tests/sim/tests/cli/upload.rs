@@ -35,7 +35,7 @@ fn whats(report: &Value, what: &str) -> usize {
     moments.filter(|moment| moment["what"] == what).count()
 }
 
-/// Checks that a chain ends at the same positions with an uploaded as with a loaded mission.
+/// Checks that an uploaded mission gives the same final positions as this mission loaded at the start.
 ///
 /// Covers wires and radio, uploads from Tx and from Rx, and good and bad links.
 #[test]

@@ -211,7 +211,7 @@ struct Planned {
     rates: Option<RateReport>,
 }
 
-/// Returns the data link for the data rates.
+/// Returns the data link from which the data rates are computed.
 ///
 /// `None` if no option requests data rates and the scenario has no section `[link]`.
 fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failure> {
@@ -233,7 +233,7 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
     Ok(Some(radio))
 }
 
-/// Plans a given number of relays, or the fewest for a target SIR. Adds the data rates, if any.
+/// Plans a given number of relays, or the fewest for a target SIR. With `radio`, adds the data rates.
 fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Result<Planned, NoPlan> {
     let most = match ask.number {
         Number::Of(relays) => relays,
@@ -354,9 +354,9 @@ fn companion(options: &Options) -> Result<Companion, Failure> {
     Ok(sections.companion)
 }
 
-/// Returns the terrain below `plan`, and the reason for a refusal; `None` if the plan is not refused.
+/// Returns the terrain below `plan`, and the reason to reject the plan, if there is one.
 ///
-/// Draws the terrain for `--profile`.
+/// Both are `None` without elevation data. Draws the terrain for `--profile`.
 fn terrain(
     options: &Options,
     scenario: &Scenario,
@@ -385,7 +385,7 @@ fn terrain(
     Ok((Some(report), problem.or(missed)))
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan cannot be flown; `None` if it can.
+/// Returns the terrain below `plan`, and the reason why the plan cannot be flown, if there is one.
 fn over(
     options: &Options,
     elevation: &Elevation,
@@ -758,7 +758,9 @@ fn over_area(
     Ok(locating)
 }
 
-/// Rejects a target SIR if the relays would choose the positions of the largest data rate.
+/// Rejects a target SIR for relays that would choose the positions of the largest data rate instead.
+///
+/// These are relays with free altitudes and fitted slots (as long as each hop needs), except in a random field.
 fn check_target(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let wanted = &options.wanted;
     let asked = match (wanted.target_sir, wanted.target_sir_db) {

@@ -746,9 +746,9 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
 
 /// Returns the method to provision: `method`, else the method of the section `network`, else `align`.
 ///
-/// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is from the section. If
-/// the two differ, there is an error if `method` is from the plan. A method from the command line is used, and a
-/// message is printed.
+/// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is the method of the
+/// section. If both are given and differ, a method from the plan is an error; a method from the command line is used,
+/// and a message is printed.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,

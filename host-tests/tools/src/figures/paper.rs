@@ -13,10 +13,10 @@ pub(super) const FINE: f64 = 1e-6;
 /// Relative tolerance of the target SIR for simulated chains: the default of `cargo chain`.
 const FLOWN: f64 = 1e-4;
 
-/// Returns the paper's multi-hop scenario: the fourth and fifth part of its table.
+/// Returns the paper's multi-hop scenario, the fourth and fifth part of the paper's parameter table.
 ///
 /// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no minimum separation, because
-/// the printed Algorithms 1 and 4 have none. A separation of 4 m would not change any of the optima.
+/// Algorithms 1 and 4 in the paper have none. A separation of 4 m would not change any of the optima.
 pub fn multi_hop() -> Scenario {
     Scenario {
         min_separation_m: 0.0,

@@ -25,7 +25,7 @@ pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 struct AgreementShare {
     scene: &'static str,
     relays: u16,
-    /// Number of agreements on positions so far that used measurements of the interference.
+    /// Number of agreements on positions that used measurements of the interference.
     agreements: usize,
     /// Median of the chain's SIR divided by the best possible SIR, over all arrangements of interferers.
     median_linear: f64,

@@ -47,7 +47,9 @@ struct Row {
     middle_sir_linear: f64,
 }
 
-/// Returns the paper's dual-hop scenario (third part of its table), with one relay at `altitude_m`.
+/// Returns the paper's dual-hop scenario, with one relay at `altitude_m`.
+///
+/// It is the third part of the paper's table of parameters.
 pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
     let altitude_m = f64::from(altitude_m);
     Scenario {
@@ -137,7 +139,7 @@ pub enum Reading {
     /// Mean over the altitudes of the gain in linear SIR.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Gain in the linear SIR that is averaged over the altitudes.
+    /// Gain of the mean linear SIR, where the linear SIRs are averaged over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
     /// Gain of the mean SIR, where the SIRs are averaged in dB over the altitudes.
@@ -177,11 +179,11 @@ struct GainRow {
     reading: Reading,
     /// Average gain over a random position, percent.
     ///
-    /// `None` if the random position's average is not above 0, as an average in dB can be.
+    /// `None` if the average for the random position is 0 or less, which is possible for an average in dB.
     over_random_percent: Option<f64>,
     /// Average gain over the position that ignores the interference, percent.
     ///
-    /// `None` if that position's average is not above 0, as an average in dB can be.
+    /// `None` if the average for that position is 0 or less, which is possible for an average in dB.
     over_blind_percent: Option<f64>,
     over_middle_percent: Option<f64>,
     /// Largest gain in linear SIR over a random position, percent: the maximum over the altitudes.
@@ -278,8 +280,8 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
 
 /// Returns the larger difference between a row's two average gains and the printed gains.
 ///
-/// The difference is in percentage points. If `middle` is true, the second average is the gain over a relay in the
-/// middle, otherwise over the blind method.
+/// The difference is in percentage points. The first gain is over random positions. The second gain is over the middle
+/// between Tx and Rx if `middle` is true, otherwise over the blind method, which ignores the interference.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent
@@ -327,8 +329,8 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
 
 /// Returns the cells of the caption's table, which compares printed with computed averages.
 ///
-/// The first row has the printed averages. Then each reading has a row with its nearest averages, and their pair of
-/// powers. The last rows are for the pairs of powers in the figure.
+/// The first row has the printed averages. Then each reading has a row: its averages nearest to the printed ones, and
+/// the pair of powers that gives them. The last rows are for the pairs of powers in the figure.
 fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",

@@ -80,7 +80,7 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
 /// Returns the SIR of the best chain at `altitude_m` that keeps the minimum separation, linear.
 ///
 /// `tolerance` is relative. `None` if there are no relays or no interferers, if the relays do not fit between Tx and
-/// Rx, and if no chain has an SIR above 0.
+/// Rx, or if no chain has an SIR above 0.
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)
@@ -136,9 +136,9 @@ const COMMON_TOLERANCE: f64 = 1e-11;
 /// Returns the best chain whose relays share one permitted altitude.
 ///
 /// It is never worse than at the lowest or the highest altitude. The range is scanned, and the three highest maxima are
-/// refined. A narrower maximum between scanned altitudes may be missed. `None` as for [`optimum`](super::optimum()), if
-/// a relay has a fixed altitude of its own, and for an empty range. The cost is about 120 times that of
-/// [`optimum`](super::optimum()).
+/// refined. A maximum that is narrower than the distance of two scanned altitudes may be missed. `None` as for
+/// [`optimum`](super::optimum()), if a relay has a fixed altitude, or if no altitude is permitted. The cost is about
+/// 120 times that of [`optimum`](super::optimum()).
 pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     let band = scene.band;
     if scene.relays.iter().any(|relay| relay.holds) || !(band.least_m <= band.most_m) {
@@ -234,7 +234,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// x of the receiver, m, at which it meets the target if the sender is at the smallest x of `from`.
+    /// x, m, of the receiver in `to` that allows the smallest x of the sender, the lower end of `from`.
     farthest: f64,
 }
 
@@ -250,7 +250,7 @@ pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
     target: f64,
-    /// Feasible hops that relays N - 1, N - 2, ..., 1 send, in this order.
+    /// Feasible hops from each relay to the next relay: from relay N - 1 first, from relay 1 last.
     before: Vec<Stage>,
     /// Positions of relay 1 from which all hops to Rx can meet the target SIR.
     first: Vec<Span>,
@@ -498,9 +498,9 @@ impl<'a> Line<'a> {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// Returns the x of the receivers whose senders can be closest to Tx.
+    /// Returns the receivers' x, m, at which the smallest possible x of the sender has a minimum.
     ///
-    /// They are the minima of [`Line::heard_from`] over the receiver's x.
+    /// The smallest x of the sender is [`Line::heard_from`].
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
         // The slope of `heard_from` is 1 - stride x slope of `quiet`.
         let level = 1.0 / stride.0;

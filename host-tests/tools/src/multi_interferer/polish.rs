@@ -22,7 +22,7 @@ const PLACES: u32 = 16;
 
 /// Number of equal steps in the first round's scan of altitudes, and of lateral positions.
 ///
-/// Later rounds search only from one such step below to one such step above the present value.
+/// Later rounds search only the length of one of these steps below and above the present value.
 const LEVELS: u32 = 8;
 
 /// Number of golden-section steps that refine a maximum. They reduce the interval to 1e-7 of its length.
@@ -202,8 +202,8 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
 
 /// Searches the altitude or lateral position near `own` at which a relay has the best SIR.
 ///
-/// `at` returns the relay's best position and its SIR for a given altitude or lateral position. The search covers the
-/// fraction `window` of the range `least` to `most` above `own`, and the same below.
+/// `at` returns the relay's best position and its SIR for a given altitude or lateral position. The search covers an
+/// interval above `own` and an equal interval below: each has the length `window` times (`most` - `least`).
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

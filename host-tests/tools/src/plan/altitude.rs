@@ -55,9 +55,9 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
 
 /// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
 ///
-/// It computes without messages what the relays compute on board: the solution for the whole chain, and then the
-/// messages along the chain that fix each position. `seat_of` returns a relay's power, and the altitudes and lateral
-/// positions that it may choose.
+/// It computes without messages what the relays compute on board: first the solution for the whole chain, then each
+/// relay's final x, which relays in flight find by messages along the chain. `seat_of` returns a relay's power, and the
+/// altitudes and lateral positions that it may choose.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
     let target = loop {
@@ -115,7 +115,7 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
     Some(places)
 }
 
-/// Number of common altitudes that are tried for the upper limit of the fewest relays.
+/// Number of common altitudes at which the fewest relays are computed, to limit the search.
 const LEVELS: u8 = 9;
 
 /// Returns the plan with the fewest relays that give every hop the SIR `target`, with free altitudes.
