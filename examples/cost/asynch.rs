@@ -107,7 +107,9 @@ impl Clock for FixedClock {
     }
 }
 
-/// Returns relay 2 of 3 and the first sweep message from relay 1: bytes, length, and time.
+/// Returns relay 2 of 3, and the first sweep message (search for positions) from relay 1.
+///
+/// The message is given as the bytes of its frame, their number, and the time of sending.
 fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -125,6 +127,8 @@ fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
 }
 
 /// Measures the instructions for relay 2 to handle a sweep message, with blocking and async ports.
+///
+/// A sweep message tries several target SIRs along the chain.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = relay_and_sweep() else {

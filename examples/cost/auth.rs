@@ -34,6 +34,8 @@ fn exchange_all(upper: &mut Relay, lower: &mut Relay, now: Instant) {
 }
 
 /// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay.
+///
+/// A sweep message tries several target SIRs along the chain.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);

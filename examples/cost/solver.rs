@@ -9,7 +9,7 @@ use super::missions::{BOTH, FITTED, FITTED_HIGH, HIGH, WIDE};
 
 /// Solves a chain of `relays` relays by the joint method, in several calls.
 ///
-/// Returns the instructions of all calls, the instructions of the most expensive call, and the number of calls.
+/// Returns the number of instructions of all calls together, that of the most expensive call, and the number of calls.
 fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);

@@ -9,7 +9,7 @@ use super::missions::mission;
 
 /// Measures the maximum stack use of a relay's calls, bytes.
 ///
-/// The calls overwrite a pattern on the stack, of which the intact rest is measured.
+/// The stack is first filled with a pattern. The bytes that the calls overwrite are counted.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);

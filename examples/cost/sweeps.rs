@@ -75,7 +75,7 @@ struct SweepCost {
     at_tail: u32,
     back: u32,
     next: u32,
-    /// Length of the longest frame in the sweep, bytes.
+    /// Length of the longest sweep message from relay 1, bytes.
     longest: usize,
     /// True if the chain has agreed on positions.
     settled: bool,
@@ -177,7 +177,9 @@ fn measured(mission: Mission) -> SweepCost {
     }
 }
 
-/// Measures the instructions to deframe and check the first sweep message of eight relays.
+/// Measures the instructions to deframe and check the first sweep message in a chain of eight relays.
+///
+/// A sweep message tries several target SIRs along the chain.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn deframe() {
     let settings = Settings {

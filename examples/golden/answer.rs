@@ -10,8 +10,8 @@ pub const READY: &[u8] = b"ready\0";
 
 /// Generator of the answers to received frames.
 ///
-/// The answer to a valid frame is that frame, decoded and encoded again. After a sweep message a second answer
-/// follows: a verdict with values of the sweep. The answer to an invalid frame is a digit for the error, and a
+/// The answer to a valid frame is that frame, decoded and encoded again. After a sweep message (search for positions) a
+/// verdict with values of this message follows. The answer to an invalid frame is a digit for the error, and a
 /// delimiter.
 pub struct Answerer {
     deframer: Deframer,

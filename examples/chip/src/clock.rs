@@ -85,7 +85,7 @@ impl Clocks {
     }
 }
 
-/// Frequency of the PLL's input, Hz: that of its source, divided.
+/// Frequency of the PLL's input, Hz. The frequency of the PLL's source is divided to this value.
 pub const PLL_INPUT_HZ: u32 = 2_000_000;
 
 /// PLL settings for one frequency of the core.
@@ -94,7 +94,7 @@ struct Pll {
     over_drive: bool,
     /// Multiplier of the PLL (PLLN): the core's frequency in MHz.
     plln: u32,
-    /// Divisor of the PLL's USB output (PLLQ): at most 48 MHz. USB is not used.
+    /// Divisor (PLLQ) that gives the PLL's USB output at most 48 MHz. USB is not used.
     pllq: u32,
 }
 
@@ -162,8 +162,9 @@ const CACHES: u32 = 0b11 << 9;
 /// Chip ID of an STM32F405 of revision A, whose flash prefetch is defective (ES0182).
 const NO_PREFETCH: u32 = 0x1000_0413;
 
-/// Maximum number of reads while a PLL, a voltage or a clock switch settles, about 10 ms at 16 MHz. The data sheets
-/// give at most 0.3 ms.
+/// Maximum number of register reads while a PLL, a voltage or a clock switch settles.
+///
+/// The reads take about 10 ms at 16 MHz. The data sheets give at most 0.3 ms for settling.
 const POLLS: u32 = 20_000;
 
 /// Sets up the clocks of a board, and returns the frequencies reached. Takes at most 0.2 s.

@@ -61,7 +61,7 @@ pub fn stop(chip: &mut impl Registers) {
     chip.modify(Register::ClockControl, HSE_ON, 0);
 }
 
-/// Returns the period of the divided crystal clock, in HSI periods; `None` without edges.
+/// Returns the period of the divided crystal clock, in HSI periods; `None` if it has no edges.
 fn period(chip: &mut impl Registers) -> Option<u32> {
     chip.modify(Register::ClockConfig, 0x1F << 16, DIVIDED);
     chip.modify(Register::Apb2Enable, 0, TIMER_ON);

@@ -239,8 +239,8 @@ impl Registers for MockRegisters {
         }
     }
 
-    /// Reads the register once, because more reads would return the same value. The only exception is the timer's
-    /// status.
+    /// Reads the register once, because more reads would return the same value. Only the timer's status is read
+    /// repeatedly.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

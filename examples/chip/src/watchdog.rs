@@ -18,7 +18,7 @@ pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 /// Maximum sleep of the relay's main loop, ms. The loop feeds the watchdog before it sleeps.
 pub const TURN_MS: u64 = 500;
 
-/// Delay of the relay's timer from which on the watchdog must not be fed, ms.
+/// Lateness of the relay's next timer, ms, from which on the main loop must not feed the watchdog.
 pub const LATE_MS: u64 = 1_000;
 
 /// Returns true if the main loop may feed the watchdog at `now_us`.

@@ -22,7 +22,7 @@ pub const WORDS: usize = 1;
 /// If the key depended on the configuration block, a changed block would reset the epoch, which must never fall.
 pub const KEY: u32 = 0;
 
-/// Returns the epoch of this start, and true if it was stored.
+/// Returns the epoch of this start (a number that rises at every start), and true if it was stored.
 ///
 /// The epoch is at least `floor`. The result is `None` once the last epoch, 4294967294, has been used.
 pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> {

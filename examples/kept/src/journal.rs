@@ -193,7 +193,9 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// Returns the CRC of the record that begins at word `first`: over all words but its last, and the key.
+    /// Returns the CRC of the record that begins at word `first`.
+    ///
+    /// The CRC covers all words of the record except the last (the CRC itself), and then the journal's key.
     #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();

@@ -453,7 +453,9 @@ fn the_worst_case_is_that_of_brute_force() {
     }
 }
 
-/// Returns the SIR of the worst hop at the quantile `share`, over positions and powers drawn here.
+/// Returns the SIR that the worst hop has at least in the fraction `share` of random cases.
+///
+/// A case is a position and a power of the interferer, drawn by this function.
 fn quantile(drawn: &Drawn, plan: &Plan, share: f64) -> f64 {
     let rng = &mut ChaCha8Rng::seed_from_u64(99);
     let mut scene = Scene::new(&drawn.scenario, drawn.relays).unwrap();
@@ -634,9 +636,9 @@ fn the_command_reports_the_area_and_draws_its_map() {
     );
 }
 
-/// Checks the planner's error of a located interferer against the scatter of least-squares fits.
+/// Checks the planner's standard deviation of a located interferer against least-squares fits.
 ///
-/// The fits are to random measurements. The two must differ by less than 15 %.
+/// The scatter of fits to random measurements must differ from this standard deviation by less than 15 %.
 #[test]
 fn the_error_of_the_location_is_that_of_fits() {
     let rng = &mut ChaCha8Rng::seed_from_u64(7);
@@ -990,7 +992,7 @@ fn a_plan_in_another_folder_finds_its_files() {
     assert!(of("own/plan.toml").contains("\nfile = \"zones.geojson\"\n"));
 }
 
-/// Checks no-fly areas on the paths of relays that keep their altitudes, and after each loss.
+/// Checks no-fly areas on the paths of relays at fixed altitudes, also after the loss of a relay.
 #[test]
 fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let folder = tempfile::tempdir().unwrap();

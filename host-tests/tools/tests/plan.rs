@@ -42,9 +42,9 @@ fn number(value: &Value) -> f64 {
         .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// Writes a scenario file with the geometry and powers of a reference case, and `interference`.
+/// Writes a scenario file with the geometry and powers of `case` and the text `interference`.
 ///
-/// The channel is the default, which is the paper's.
+/// `case` is a case of the reference. The channel is the default, which is the paper's.
 fn scenario(case: &Case, interference: &str) -> tempfile::NamedTempFile {
     let p = &case.params;
     let mut text = String::new();

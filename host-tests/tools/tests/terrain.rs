@@ -145,10 +145,10 @@ fn the_search_finds_the_best_chain_of_a_small_grid() {
     }
 }
 
-/// Checks that positions for the terrain are no worse than those that ignore it.
+/// Checks that positions for the terrain are no worse than positions that ignore the terrain.
 ///
-/// Those that ignore the terrain are the joint method's positions, and positions at 120 m. If they can be flown, the
-/// loss must be below 0.01 dB. The median gain over all scenes must be above -0.1 dB.
+/// The latter are the joint method's positions, and positions at 120 m. If these can be flown, the positions for the
+/// terrain may lose less than 0.01 dB. The median gain over all scenes must be above -0.1 dB.
 #[test]
 fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -868,6 +868,8 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
 }
 
 /// Checks that rooms end before no-fly areas, and that accepted blocked hops are named.
+///
+/// A relay's room is the interval of x in which it may drift.
 #[test]
 fn rooms_keep_out_of_no_fly_areas_and_accepted_hops_are_named() {
     let folder = tempfile::tempdir().unwrap();

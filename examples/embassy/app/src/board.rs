@@ -17,7 +17,8 @@ pub struct Board<F> {
     pub reset: Reset,
     /// Flash for state that survives a reboot; `None` if the board has none.
     ///
-    /// Without such flash, a block with a signing key is refused, and the relay's votes are lost at a reboot.
+    /// Without such flash, a block with a signing key is refused, and the relay's votes on the chain's membership are
+    /// lost at a reboot.
     pub storage: Option<Storage<F>>,
 }
 

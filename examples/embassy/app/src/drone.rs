@@ -51,9 +51,9 @@ impl Default for DroneStorage {
 pub enum Refused {
     /// The configuration block is invalid.
     Block(ConfigError),
-    /// The configuration block has a signing key, but the board has no flash to store the epoch.
+    /// The configuration block has a signing key, but the board has no flash for the signing epoch.
     NoFlash,
-    /// The last epoch has been used, so signing is impossible.
+    /// The signing epoch, a number that rises at every start, cannot rise further. So frames cannot be signed.
     NoEpoch,
     /// The configuration block has Tx and Rx positions, but the board has no port to an autopilot.
     NoAutopilot,

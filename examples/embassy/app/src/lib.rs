@@ -164,7 +164,9 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     .await
 }
 
-/// Runs the relay of `board` on the ports that `run` serves. Changed votes are stored before the relay sends.
+/// Runs the relay of `board` on the ports that the function `run` reads and writes.
+///
+/// Changed votes on the chain's membership are stored before the relay sends.
 async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     store: &'static mut DroneStorage,
     board: Board<F>,

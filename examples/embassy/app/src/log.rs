@@ -70,7 +70,7 @@ pub(crate) fn signs_to_autopilot() {
     );
 }
 
-/// Logs that votes were found after a reboot, and whether the relay accepts them.
+/// Logs that votes on the chain's members were found in flash, and if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's members from before this start were read from flash");
@@ -81,7 +81,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     }
 }
 
-/// Logs that storing the relay's votes works again (true) or fails (false).
+/// Logs that storing votes on the chain's members works again (true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
         info!("votes on the chain's members can be stored in flash again");

@@ -18,7 +18,7 @@ pub(crate) struct Votes<F> {
 }
 
 impl<F: NorFlash> Votes<F> {
-    /// Restores the votes stored before the reboot into a newly created `relay`.
+    /// Restores the votes on the chain's membership stored before the reboot into a newly created `relay`.
     pub(crate) fn resume(
         storage: Storage<F>,
         block: &Block,
@@ -32,7 +32,7 @@ impl<F: NorFlash> Votes<F> {
         Self { flash, block, view }
     }
 
-    /// Stores the relay's votes. If the write fails, the relay flies on.
+    /// Stores the relay's votes on the chain's membership. If the write fails, the relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) {
         let Self { flash, block, view } = self;
         if let Some(stored) = view.store(record, journal(flash, *block)) {

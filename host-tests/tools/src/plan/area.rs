@@ -32,34 +32,42 @@ const MOST_SEARCHED: u16 = 50;
 /// Quantile that is reported if no other quantile is requested.
 pub const QUANTILE: f64 = 0.95;
 
-/// Numbers of random draws of the interferers: to optimise a quantile, and to compute its result.
+/// Numbers of random draws of the interferers.
+///
+/// The first number is for the search for positions with the best quantile of the SIR, the second for the reported
+/// quantile.
 const DRAWS: [usize; 2] = [400, 4000];
 
 /// Seed of the random draws. It is fixed, so that equal scenarios have equal plans.
 const SEED: u64 = 36;
 
-/// Largest number of rounds of the search for a quantile. Each round leaves out the draws with the lowest SIRs.
+/// Largest number of rounds of the search for positions with the best quantile of the SIR.
+///
+/// Each round leaves out the random draws in which the chain of the previous round has the lowest SIRs.
 const ROUNDS: u32 = 8;
 
-/// Factor on the SIR of a hop if the straight path between its two relays crosses a no-fly area. Such chains rank
-/// behind all others.
+/// Factor on the SIR of a hop if a relay crosses a no-fly area on its way to the hop's other relay.
+///
+/// A chain with such a hop ranks behind all chains without one.
 const CROSSING: f64 = 1e-30;
 
 /// Length that counts as 0 because of rounding, m: depth in a no-fly area, or length of a path in it.
 const ROUNDING_M: f64 = 0.01;
 
-/// Numbers of steps in x, y and altitude of the first grid, if a relay may choose them.
+/// Least numbers of steps of the first grid of positions, along x, y and altitude.
+///
+/// A coordinate that relays may not choose has no steps.
 const GRID: [u32; 3] = [40, 7, 5];
 
-/// Largest number of searches in windows around the relays, and factor on the width of a window.
+/// Largest number of searches on small grids (windows) around the relays, and factor on their width.
 ///
-/// The factor applies after a search that raises the SIR only a little.
+/// The factor applies after a search that raises the SIR by at most 0.1 %.
 const WINDOWS: (u32, f64) = (120, 0.6);
 
-/// Largest number of times that the windows around the relays are reset to their full width.
+/// Largest number of restarts of the search with windows (small grids around the relays) of full width.
 const RESTARTS: u32 = 5;
 
-/// Width of the narrowest window along x, as a fraction of the distance Tx-Rx.
+/// Smallest width of a window (small grid around a relay) along x, as a fraction of the distance Tx-Rx.
 const NARROWEST: f64 = 1e-7;
 
 /// Criterion for the choice of positions.
@@ -70,7 +78,7 @@ pub struct Criterion {
     /// A case is a choice of the interferers' positions and powers within their limits. `None` to maximise the SIR of
     /// the worst case.
     pub quantile: Option<f64>,
-    /// True if the path between two neighbours may cross a no-fly area.
+    /// True if a relay may cross a no-fly area on its way to the position of a neighbouring relay.
     pub allow_crossing: bool,
 }
 
@@ -133,8 +141,10 @@ pub fn at_centre(scenario: &Scenario) -> Scenario {
     }
 }
 
-/// Returns a mission for the profiles of the relays. The mission has only one of the interferers, and this one is not
-/// used.
+/// Returns a mission with the profiles (power, altitude) of the relays.
+///
+/// If interferers have areas, the mission has only the first interferer, in the middle of its area. The planner does
+/// not use this interferer.
 pub(super) fn profiles(
     scenario: &Scenario,
     relays: u16,
@@ -242,9 +252,10 @@ fn places_of(plan: &Plan) -> Vec<Place> {
 /// Position x, y and altitude, m.
 type Point = [f64; 3];
 
-/// Returns the paths of two neighbours when a gap is closed. Each flies to the position of the other one.
+/// Returns the straight paths of two neighbouring relays, each to the position of the other relay.
 ///
-/// A relay flies straight to its new position. A relay that `keeps` its altitude, as with Algorithm 1, flies level.
+/// Relays fly on these paths when they close a gap after a loss. With `keeps`, as in Algorithm 1, a relay stays at its
+/// altitude.
 pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {
     let at = |place: Point, altitude_m: f64| [place[0], place[1], altitude_m];
     [
@@ -268,7 +279,7 @@ pub(super) fn range(area: &NoFly) -> String {
 /// Returns the reason why relays cannot be at the positions `chain`; `None` if they can.
 ///
 /// If `is_free` is true, relays choose their altitudes in flight, except relays with an altitude in the scenario. If
-/// `allow_crossing` is true, a path between neighbours through a no-fly area is not a reason.
+/// `allow_crossing` is true, the path from a relay to a neighbouring relay's position may cross a no-fly area.
 pub fn problem(
     scenario: &Scenario,
     chain: &[Placement],
@@ -363,7 +374,7 @@ struct Search<'a> {
     no_fly: &'a [NoFly],
     is_free: bool,
     allow_crossing: bool,
-    /// Random draws of the interferers that count for the quantile; empty for the worst case.
+    /// Remaining random draws of the interferers in the search for a quantile; empty for the worst case.
     draws: Vec<Vec<Source>>,
 }
 
@@ -406,7 +417,9 @@ impl<'a> Search<'a> {
         self.spot(Place { x, y: 0.0, h: 0.0 }, self.scene.mu_nlos)
     }
 
-    /// Returns the allowed positions of relay `relay` (from 0) among `x`, `y` and altitudes `h`.
+    /// Returns the allowed positions of relay `relay` (from 0): combinations of `x`, `y` and altitudes `h`.
+    ///
+    /// A relay with a fixed altitude has only this altitude.
     fn spots(&self, relay: usize, [x, y, h]: &[Vec<f64>; 3]) -> Vec<Spot> {
         let held = self.scene.relays.get(relay);
         let held = held.filter(|relay| relay.holds || !self.is_free);
@@ -423,7 +436,10 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Returns the SIR of the hop to node `node`, linear; 0 if the two relays are too close. Node 0 is Tx.
+    /// Returns the SIR of the hop from the node before `node` to `node`, linear. Node 0 is Tx.
+    ///
+    /// For data in both directions it is the smaller of two values: the SIR toward Rx, and the SIR toward Tx divided by
+    /// `reverse`. It is 0 if two relays are too close.
     fn hop(&self, node: usize, from: Spot, to: Spot) -> f64 {
         let scene = self.scene;
         let relays = &scene.relays;
@@ -451,7 +467,10 @@ impl<'a> Search<'a> {
         there.min(rx_w / (factor * squared) / from.disturbance_w / scene.reverse)
     }
 
-    /// Returns the factor for a hop's SIR: [`CROSSING`] if a path crosses a no-fly area, else 1.
+    /// Returns the factor on the SIR of a hop.
+    ///
+    /// The factor is [`CROSSING`] if the path of one relay of the hop to the position of the other relay crosses a
+    /// no-fly area. It is 1 otherwise, and if crossing is allowed.
     fn preference(&self, node: usize, from: Spot, to: Spot) -> f64 {
         let is_inner = node > 1 && node <= self.scene.relays.len() && !self.allow_crossing;
         let keeps = |relay: usize| {
@@ -474,7 +493,7 @@ impl<'a> Search<'a> {
 
     /// Returns the chain whose worst hop has the largest SIR, and this SIR.
     ///
-    /// Relay k is at a spot of `grids[k - 1]`.
+    /// Relay k is at one of the positions `grids[k - 1]`.
     fn best_on(&self, grids: &[Vec<Spot>]) -> Option<(Vec<Spot>, f64)> {
         // For each spot of a relay: the SIR of the worst hop so far, and the index of the previous spot. The best spots
         // are first.
@@ -517,7 +536,7 @@ impl<'a> Search<'a> {
         Some((chain, sir))
     }
 
-    /// Returns the least and the greatest x, y and altitude of relays, m.
+    /// Returns the limits of the permitted positions: least and greatest x, y and altitude, m.
     fn room(&self) -> [[f64; 2]; 3] {
         let band = self.scene.band;
         if self.is_free {
@@ -532,7 +551,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns the best chain found from a grid and from the chains `starts`.
+    /// Returns the best chain found by searches that start from a grid and from the chains `starts`.
     fn best(&self, starts: &[Vec<Place>]) -> Option<Vec<Place>> {
         let room = self.room();
         let is_single = room.iter().skip(1).all(|[low, high]| low >= high);
@@ -578,9 +597,9 @@ impl<'a> Search<'a> {
         each.map(|at| self.spot(*at, self.scene.eta)).collect()
     }
 
-    /// Returns the chain after moves within windows around all relays, and its SIR.
+    /// Returns the SIR and positions of the best chain found on small grids around the relays of `start`.
     ///
-    /// `None` if no allowed position is within the windows.
+    /// The small grids (windows) become narrower from search to search. `None` if they contain no allowed position.
     fn refined(&self, start: &[Spot]) -> Option<(f64, Vec<Place>)> {
         let room = self.room();
         let mut width = room.map(|[low, high]| high - low);
@@ -635,7 +654,7 @@ impl<'a> Search<'a> {
         found.map(|(sir, chain)| (sir, chain.iter().map(|spot| spot.at).collect()))
     }
 
-    /// Returns the chain with the best quantile that is found from `starts`.
+    /// Returns the chain with the best quantile of the SIR, found by searches that start from `starts`.
     fn by_quantile(
         &self,
         scenario: &'a Scenario,
@@ -710,7 +729,7 @@ impl Draws {
         }
     }
 
-    /// Returns the SIR of the worst hop and the index of each draw, by falling SIR.
+    /// Returns the SIR of the chain's worst hop for each draw, and the draw's index, by falling SIR.
     fn sirs(&self, chain: &[Place]) -> Vec<(f64, usize)> {
         let mut scene = self.scene.clone();
         let each = self.draws.iter().enumerate().map(|(at, draw)| {
@@ -741,7 +760,7 @@ impl Draws {
             .map_or(0.0, |(sir, _)| *sir)
     }
 
-    /// Returns the fraction `quantile` of all draws: those in which the chain has the largest SIRs.
+    /// Returns the draws in which the chain has the largest SIRs; their share of all draws is `quantile`.
     fn most_harmless(&self, chain: &[Place], quantile: f64) -> Vec<Vec<Source>> {
         let sirs = self.sirs(chain).into_iter().take(self.counted(quantile));
         sirs.filter_map(|(_, at)| self.draws.get(at).cloned())
@@ -749,7 +768,7 @@ impl Draws {
     }
 }
 
-/// Largest number of random points that are drawn until one is inside the area.
+/// Largest number of random points that are drawn in search of a point inside an interferer's area.
 const TRIES: u32 = 100_000;
 
 fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
@@ -767,7 +786,7 @@ fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
     Source { power_w, x_m, y_m }
 }
 
-/// SIRs of a chain over the areas of the interferers.
+/// SIRs of a chain against interferers in areas: the worst case, and a quantile.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct OverArea {
     /// SIR of the worst hop with the interferers at their worst positions and greatest powers, dB.
@@ -791,7 +810,7 @@ pub struct AreaReport {
     /// SIRs of the plan for interferers in the middle of their areas; absent if there is no such plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre: Option<OverArea>,
-    /// Position [x, y] of each interferer with an area, m, at which the plan's worst hop is worst.
+    /// Position [x, y], m, in each interferer's area at which the SIR of the plan's worst hop is least.
     pub worst_places: Vec<[f64; 2]>,
 }
 
@@ -869,7 +888,7 @@ fn receiver(scene: &Scene, chain: &[Placement]) -> [f64; 2] {
     worst.map_or([0.0; 2], |(_, at)| *at)
 }
 
-/// Cell of the map of SIRs: a square, and the SIR of the worst hop if the interferer is in it.
+/// Cell of the map of SIRs: a square in which the interferer may be, and the SIR of the worst hop.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Cell {
     /// Index of the interferer, from 0.
@@ -880,9 +899,9 @@ pub struct Cell {
     pub side_m: f64,
     /// SIR of the worst hop, dB. The interferer is in the middle of the cell, at its greatest power.
     pub sir_db: f64,
-    /// Standard deviation, m, of the position that relays with `[listen]` estimate for an interferer here.
+    /// Standard deviation, m, of the relays' estimate of the position of an interferer in this cell.
     ///
-    /// Infinite if they cannot locate the interferer. `None` if it is not computed.
+    /// Infinite if the relays cannot locate the interferer. `None` if this deviation is not computed.
     pub error_m: Option<f64>,
 }
 

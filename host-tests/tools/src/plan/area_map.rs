@@ -9,8 +9,9 @@ use uav_relay_scenario::{Line, Scenario};
 use super::Plan;
 use super::area::Cell;
 
-/// Width of the picture, in picture units, and width of its margin.
+/// Width of the picture with its margins, in picture units.
 const WIDTH: f64 = 900.0;
+/// Width of the left and of the right margin of the picture, in picture units.
 const MARGIN: f64 = 40.0;
 
 /// Greatest height of the picture without margins, as a fraction of its width.
@@ -149,7 +150,7 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell], shown: Shown) -> St
     out
 }
 
-/// Returns the colour of a value, as a fraction of the colour scale, 0 to 1.
+/// Returns the colour at `share` of the colour scale: 0 is its lowest value, 1 its highest value.
 fn colour(share: f64) -> String {
     let place = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     let mut mixed = [0.0; 3];
@@ -188,10 +189,10 @@ fn frame(scenario: &Scenario, relays: &[[f64; 2]], cells: &[Cell]) -> [[f64; 2];
     )
 }
 
-/// Returns `cells` as the text of a GeoJSON file: a square for each, with `sir_db` and `error_m`.
+/// Returns the text of a GeoJSON file with a square for each cell, with `sir_db` and `error_m`.
 ///
 /// # Errors
-/// A text that names a cell that is too far from the line Tx-Rx.
+/// A text with a position that is too far from the line Tx-Rx for geographic coordinates.
 pub fn geojson(line: &Line, cells: &[Cell]) -> Result<String, String> {
     let corner = |[x, y]: [f64; 2]| {
         #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]

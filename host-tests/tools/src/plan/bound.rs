@@ -18,21 +18,21 @@ use std::ops::Range;
 
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Number of equal cells between Tx and Rx at the beginning. A relay may be in any of them.
+/// Number of equal cells (intervals of x from Tx to Rx) in which a relay may be when the search begins.
 const FIRST: usize = 256;
 
-/// Number of equal parts into which a cell is divided.
+/// Number of equal parts into which a cell (interval of x) is divided.
 const PARTS: usize = 4;
 
-/// Largest number of cells of all relays together. With more cells, the search ends without a proof.
+/// Largest number of cells (intervals of x), summed over the relays. With more, the search ends without a proof.
 const MOST_CELLS: usize = 60_000;
 
-/// Largest number of rounds in which cells are divided.
+/// Largest number of rounds. Each round divides every remaining cell (interval of x).
 ///
 /// The smallest cells are some 1e-8 of the distance from Tx to Rx.
 const MOST_LEVELS: usize = 10;
 
-/// Largest number of relays in a proof. With more relays no proof is tried.
+/// Largest number of relays for which [`excludes`] tries a proof.
 const MOST_RELAYS: usize = 200;
 
 /// Allowance for rounding errors, as a fraction of a squared length.
@@ -49,7 +49,7 @@ pub struct Targets {
 
 /// Returns true if it is proven that no positions on the line Tx-Rx meet `targets`.
 ///
-/// The relays keep their own altitudes. False only means that there is no proof.
+/// The altitudes of the relays are fixed. False only means that there is no proof.
 pub fn excludes(scene: &Scene, targets: Targets) -> bool {
     let relays = scene.relays.len();
     if relays == 0 || relays > MOST_RELAYS || !(targets.there > 0.0 && targets.there.is_finite()) {
@@ -94,15 +94,15 @@ struct Bound<'a> {
 
 /// Node of the chain with the cells (intervals of x) that it may be in, ascending.
 ///
-/// `hears_squared` belongs to the cells. It is the largest squared length, m^2, of a hop that the node can receive in
-/// the cell at the target SIR.
+/// `hears_squared` has a value for each cell: the largest squared distance along x, m^2, from which the node in this
+/// cell can receive at the target SIR.
 struct Node<'a> {
     cells: &'a [Range<f64>],
     hears_squared: Vec<f64>,
 }
 
 impl Bound<'_> {
-    /// Drops the cells that no chain of possible hops from Tx to Rx uses.
+    /// Drops the cells (intervals of x) that no chain of possible hops from Tx to Rx uses.
     fn drop_cells(&self, cells: &mut [Vec<Range<f64>>]) {
         let distance_m = self.scene.distance_m;
         let ends = [vec![0.0..0.0], vec![distance_m..distance_m]];
@@ -123,10 +123,10 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns a flag for each cell of one end of `hop`: true if a cell of the opposite end allows the hop.
+    /// Returns a flag for each cell of one node of `hop`: true if a cell of the other node allows the hop.
     ///
-    /// The cells are the receiver's if `of_receiver` is true, otherwise the sender's. The sender is the node nearer to
-    /// Tx.
+    /// With `of_receiver` the flags are for the receiver's cells, otherwise for the sender's cells. The sender is the
+    /// node nearer to Tx.
     fn reached(
         &self,
         hop: usize,
@@ -166,7 +166,7 @@ impl Bound<'_> {
 
     /// Returns a lower bound on the interference power that `node` receives in `cell`, W.
     ///
-    /// The node is taken to be at the edge of the cell that is farther from the interferer, for each interferer.
+    /// For each interferer, the node is taken at the edge of the cell with the larger distance from the interferer.
     fn least_w(&self, node: usize, cell: &Range<f64>) -> f64 {
         let altitude_m = self.altitude_m(node);
         let factor = match self.relay(node) {

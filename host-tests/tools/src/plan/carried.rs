@@ -25,10 +25,10 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
-/// Largest relative excess of time per bit with which a number of relays gets a precise search.
+/// Largest relative excess of a chain's time per bit over the smallest time, both on the coarse grid.
 ///
-/// The times per bit are those on a coarse grid. The excess is relative to the smallest time of all numbers of relays.
-/// A precise search cannot make up for a larger excess.
+/// The smallest time is that of the best number of relays. A precise search for another number of relays cannot make up
+/// for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
@@ -40,17 +40,17 @@ pub struct Carried<'a> {
     scenario: &'a Scenario,
     radio: &'a Radio,
     tolerance: f64,
-    /// Largest number of relays in the table of grid positions.
+    /// Largest number of relays for which `table` has positions.
     most: u16,
     table: OnceCell<Option<Table>>,
 }
 
 impl<'a> Carried<'a> {
-    /// Creates the planner for up to `most` relays; `None` if the positions with the best SIR suffice.
+    /// Creates the planner for up to `most` relays; `None` if the positions with the best SIR are used.
     ///
-    /// These positions suffice if they also maximise the data rate: with equal time slots or a frequency for each hop,
-    /// for data in one direction or at equal rates in both. They also suffice where this planner cannot search better
-    /// positions: with free altitudes, a given x, several interferers, or interference known only along the line Tx-Rx.
+    /// They are used if they also maximise the data rate: with equal time slots or a frequency for each hop, for data
+    /// in one direction or at equal rates in both. They are also used for free altitudes, for a requested x, and for
+    /// any interference other than a single interferer.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -84,8 +84,9 @@ impl<'a> Carried<'a> {
 
     /// Returns the largest number of relays for which a precise search is worthwhile.
     ///
-    /// With more relays, one bit takes over 5 % more time on the coarse grid than with the best number. A precise
-    /// search cannot make up for this. The precise search is used for fitted time slots (as long as each hop needs).
+    /// With more relays, one bit takes over 5 % more time on the coarse grid than with the best number of relays. A
+    /// precise search cannot make up for this. The planner uses this limit for fitted time slots (as long as each hop
+    /// needs).
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }
@@ -144,7 +145,7 @@ impl<'a> Carried<'a> {
         Ok(Plan { sirs, back, ..plan })
     }
 
-    /// Returns `plan`, with `proven` set if it is proven that no positions carry more data.
+    /// Returns `plan`, with `proven` set if it is proven that no positions have a larger data rate.
     ///
     /// There is no proof for fitted time slots (as long as each hop needs).
     #[must_use]
@@ -162,10 +163,10 @@ impl<'a> Carried<'a> {
         Plan { proven, ..plan }
     }
 
-    /// Returns the positions with the largest rate that Algorithm 1 finds, by bisection on the rate.
+    /// Returns the positions with the largest data rate by Algorithm 1, repeated by bisection on the rate.
     ///
-    /// For each rate it uses the ratio of the SIRs that the two directions need. `least` is a rate that is known to be
-    /// possible, bit/s/Hz.
+    /// For a rate R, Algorithm 1 gets the ratio of two SIRs: the SIR that R toward Rx requires, and the SIR that
+    /// `reverse` times R toward Tx requires. `least` is a rate that is known to be possible, bit/s/Hz.
     fn by_ratio(&self, briefed: &ProfiledMission, least: f64) -> Option<Vec<Placement>> {
         let reverse = self.scenario.reverse;
         let model = &self.radio.link.model;

@@ -13,7 +13,7 @@ use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Sce
 use super::multi_interferer::with_one;
 use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, fitted_radio, merit, source};
 
-/// Positions that the relays would agree on in flight, and their loss.
+/// Positions that the relays would agree on in flight, compared with the best positions found.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
     /// Positions that the relays choose, with their SIRs against all interferers of the scenario.

@@ -28,7 +28,7 @@ pub const LOCATED: f64 = 0.1;
 /// Number of positions of the interferer that are simulated.
 const SIMULATED: usize = 5;
 
-/// Fraction of the best SIR (-1 dB) that a chain must have once the interferer is located.
+/// Least SIR of a chain after the interferer is located, as a fraction of the best SIR (-1 dB).
 const SHARE: f64 = 0.794;
 
 /// Longest time of a simulated search, s, in addition to a flight from Tx to Rx at 10 m/s.
@@ -42,7 +42,7 @@ pub struct Search {
     /// Time from the start of the drones beside Tx to the first estimate, s; absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate_s: Option<f64>,
-    /// Time until the chain's SIR is at most 1 dB below that with a known interferer, s.
+    /// Time until the chain's SIR is at most 1 dB below the SIR of relays that know the interferer, s.
     ///
     /// Absent if the relays do not reach such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -150,7 +150,9 @@ fn is_located(scenario: &Scenario, cell: &Cell) -> bool {
     cell.error_m.is_some_and(|error| error <= LOCATED * apart_m)
 }
 
-/// Returns the positions at which relays measure: before the first estimate, and the planned ones.
+/// Returns the positions at which relays measure the interference.
+///
+/// They are the positions before the first estimate (hops of about equal length), and the positions of `plan`.
 fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     let relays = plan.places.len() as f64;
     // Hops of equal length. For one or two relays also: the first hop half as long, and the last hop half as long.

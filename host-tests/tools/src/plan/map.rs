@@ -21,7 +21,7 @@ pub struct Feature {
     pub kind: &'static str,
     /// Coordinates of the object: one point, the two ends of a hop, or the points of a line.
     pub at: Vec<Geodetic>,
-    /// True for a line on the ground without heights, for a globe that has its own terrain.
+    /// True for a line without heights, which a globe program draws on its own terrain.
     pub is_clamped: bool,
     /// Numbers of the object, such as its position and SIR, with their names. Each name ends in the unit.
     pub numbers: Vec<(&'static str, Number)>,
@@ -154,7 +154,7 @@ impl Map {
         })
     }
 
-    /// Adds the state of each hop above the terrain, and the ground below the hop.
+    /// Adds the terrain's effect on each hop (clear, grazing or blocked), and the ground below the hop.
     ///
     /// The ground is on the map twice: with the heights of the elevation files, and clamped to the ground of the globe.
     #[must_use]

@@ -137,7 +137,7 @@ pub struct PlanRequest {
     pub tolerance: f64,
 }
 
-/// Largest accepted loss of SIR compared with the best positions, as a fraction of their SIR.
+/// Largest accepted loss of SIR or data rate, as a fraction of its value at the best positions.
 pub const LOSS: f64 = 0.01;
 
 /// Theorem, and its case, that gave the position of a single relay.
@@ -187,7 +187,7 @@ pub struct Plan {
     pub places: Vec<(Placement, Profile)>,
     /// SIR, linear, of each hop from Tx to Rx, N + 1 in all.
     pub sirs: Vec<f64>,
-    /// Worst hop in the direction from Rx to Tx; `None` for a plan of one direction.
+    /// Worst hop in the direction from Rx to Tx; `None` in a plan for data toward Rx only.
     pub back: Option<WorstBack>,
     /// Name of the algorithm that found the positions.
     pub how: &'static str,
@@ -212,7 +212,7 @@ pub enum Why {
     Short {
         /// Requested SIR of every hop, linear.
         target: f64,
-        /// Best SIR of the worst hop that was found, linear.
+        /// Best SIR found for the worst hop, linear.
         most: f64,
         /// Number of relays with the best SIR found; `None` if an untried number might do better.
         relays: Option<u16>,
@@ -441,7 +441,7 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the relays have no minimum separation, or if the separation costs no SIR.
+/// Returns true if the relays have no minimum separation, or if it does not lower the best SIR.
 ///
 /// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR is not higher
 /// without the separation, and `None` if it finds no chain.

@@ -21,10 +21,10 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// Number of start chains that local search improves. They are the ones with the best SIRs.
+/// Number of start chains that local search improves: those with the best SIRs or data rates.
 const POLISHED: usize = 2;
 
-/// Largest number of start chains that are each planned for one real interferer alone.
+/// Largest number of real interferers whose best chains (for this interferer alone) are start chains.
 const ALONE: usize = 4;
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
@@ -171,7 +171,7 @@ impl Planner<'_> {
             .max_by(|a, b| a.value.total_cmp(&b.value))
     }
 
-    /// Returns the best chains of the [`Planner::variants`].
+    /// Returns the best chain of each scenario of [`Planner::variants`] that has a chain.
     fn of_variants(&self, scene: &Scene) -> Vec<Vec<Place>> {
         let best = |variant: &Scenario| {
             let relays = u16::try_from(scene.relays.len()).ok()?;
@@ -195,11 +195,11 @@ impl Planner<'_> {
         best.max_by(|a, b| a.value.total_cmp(&b.value))
     }
 
-    /// Returns scenarios with a single interferer. Their best chains are further start chains.
+    /// Returns scenarios with a single interferer. Their best chains are start chains of a search.
     ///
-    /// The scenarios are variations of the one with the hypothetical interferer. This interferer is mirrored about the
-    /// line Tx-Rx, or replaced by one of the first real interferers. Or relays may leave the line to one side only, or
-    /// not at all.
+    /// Each scenario is that with the hypothetical interferer, with one change: the interferer is mirrored about the
+    /// line Tx-Rx, or replaced by one of the first real interferers, or y is limited to the left side, the right side
+    /// or 0.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();
@@ -369,7 +369,7 @@ fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best
     Some(Best { proven, ..best })
 }
 
-/// Lengths of the first and the last trial moves of a search, as fractions of the distance Tx-Rx.
+/// First and last length of the trial moves of relays in a search, as fractions of the distance Tx-Rx.
 const MOVES: [f64; 2] = [1.0 / 16.0, 1e-5];
 /// Relative increase of the data rate in a round of moves, below which the moves are halved.
 const GAIN: f64 = 1e-4;

@@ -32,7 +32,10 @@ use uav_relay_scenario::scene::Scene;
 pub struct Best {
     /// Distance of the relay from Tx toward Rx, m.
     pub x_m: f64,
-    /// Reason for the position. 1: above Tx, 2: above Rx, 3: two SIRs are equal there, 4: one SIR is maximal there.
+    /// Number of the reason for the position: 1 above Tx, 2 above Rx, 3 and 4 between Tx and Rx.
+    ///
+    /// Reason 3: the smallest two of the four hop SIRs are equal there. Reason 4: the smallest hop SIR has its maximum
+    /// there.
     pub case: u8,
     /// Explanation, for the user, of why the relay goes to its position.
     pub words: String,

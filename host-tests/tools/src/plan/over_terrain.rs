@@ -34,7 +34,7 @@ const LEVELS: u32 = 12;
 /// Largest number of terrain points along the whole line Tx-Rx during the search.
 const POINTS: f64 = 800.0;
 
-/// Number of points of a profile at the end of the search: all of them, as in reports.
+/// Limit on the terrain points along the line Tx-Rx at the end of the search: none, as in reports.
 pub(super) const FINE_POINTS: f64 = f64::INFINITY;
 
 /// Smallest distance between columns of the grid, m, at which hilltops between columns are tried, too.
@@ -101,12 +101,12 @@ pub struct Search<'a> {
     wavelength_m: f64,
     /// Ground along the line Tx-Rx: x and height, m.
     line: Vec<Point>,
-    /// True if `line` has only the highest points of equal steps.
+    /// True if `line` is coarse: equal steps, each with the height of the highest ground near it.
     is_coarse: bool,
-    /// Least and greatest height above the ground, m.
+    /// Least and greatest height of a relay above the ground, m.
     clearance_m: [f64; 2],
     position_error_m: f64,
-    /// True if altitudes must also be within the scenario's range of altitudes.
+    /// True if the scenario's range of altitudes applies in addition to the heights above the ground.
     is_banded: bool,
     losses: HashMap<[[u64; 2]; 2], f64>,
     no_fly: Vec<NoFly>,
@@ -242,7 +242,9 @@ impl<'a> Search<'a> {
             .collect())
     }
 
-    /// Returns the candidate positions of every relay on a grid of `columns` x by `levels` altitudes.
+    /// Returns the candidate positions of every relay on a grid of columns (values of x) and altitudes.
+    ///
+    /// The grid has `columns` columns with `levels` altitudes each.
     ///
     /// # Errors
     /// A text that names the position: the elevation files do not cover it, or have no height there.
@@ -514,7 +516,9 @@ impl<'a> Search<'a> {
         Some((chain, sir))
     }
 
-    /// Returns the SIR of the best chain from Tx to `to`, and the index of its last candidate in `before`.
+    /// Returns the SIR of the best chain from Tx to `to`, and the index of its node in `before`.
+    ///
+    /// `before` has the candidate positions of the node before `to`.
     fn reached(
         &mut self,
         node: usize,
@@ -574,7 +578,8 @@ fn coarse(fine: &[Point], step_m: f64) -> Vec<Point> {
 /// Returns the best positions over the terrain for `relays` relays with y = 0.
 ///
 /// # Errors
-/// [`NoPlan`]: too many relays, a field of interference, terrain that is not covered, or no permitted positions.
+/// [`NoPlan`]: too many relays, interference that is known only along the line Tx-Rx, terrain that is not covered, or
+/// no permitted positions.
 pub fn best(
     scenario: &Scenario,
     elevation: &Elevation,

@@ -52,9 +52,9 @@ const NARROWEST: f64 = 1e-7;
 /// Rounding error allowed in the distance of two positions, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 1.2e-7;
 
-/// Weight of a very small extra time, by which the higher SIR is preferred if two times are equal.
+/// Weight of a very small extra time that falls as the SIR rises.
 ///
-/// Hops at the same rate step of a radio have equal times.
+/// Hops at the same rate step of a radio have equal times. The extra time makes the search prefer the higher SIR.
 const GUIDE: f64 = 1e-3;
 
 /// Times that the hops of a chain need for one bit of data to Rx.
@@ -162,8 +162,8 @@ impl<'a> Times<'a> {
 
     /// Returns the time of a hop for one bit, s Hz; infinite if the hop carries nothing or is too short.
     ///
-    /// With `guide` a radio's rate steps get a very small extra time that falls as the SIR rises, so that times are not
-    /// equal.
+    /// With `guide` a very small time that falls as the SIR rises is added for a radio with rate steps. Otherwise all
+    /// hops at the same rate step have equal times.
     pub(super) fn time(&self, hop: &Hop, from: Point, to: Point, guide: bool) -> f64 {
         let apart = to.x - from.x;
         if apart < hop.least_m - ROUNDING * self.scene.distance_m || apart < 0.0 {

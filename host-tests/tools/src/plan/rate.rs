@@ -64,7 +64,7 @@ impl Rate {
 
     /// Returns the linear SIRs of all hops: for data toward Rx, and for data toward Tx.
     ///
-    /// `None` for a plan of one direction.
+    /// `None` in a plan for data toward Rx only.
     fn both_sirs(plan: &Plan, scenario: &Scenario) -> Option<[Vec<f64>; 2]> {
         plan.back?;
         let relays = u16::try_from(plan.places.len()).ok()?;
@@ -100,7 +100,7 @@ impl Rate {
     }
 }
 
-/// Data rate of a chain with this number of relays.
+/// Data rate of a chain, with the number of relays in the chain.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct RateOf {
     /// Number of relays in the chain.
@@ -139,8 +139,8 @@ pub struct Rates {
 impl Rates {
     /// Plans 1, 2, 3 and more relays, and computes their data rates over `radio`.
     ///
-    /// It ends when a larger number is proven to carry no more, or at a limit of some seconds. `target_bps` is the
-    /// wanted rate to Rx. For data in both directions, the rate to Tx must be at least `target_bps` times the
+    /// The list ends where more relays are proven to carry no more data, or at a limit of some seconds. `target_bps` is
+    /// the wanted rate to Rx. For data in both directions, the rate to Tx must be at least `target_bps` times the
     /// scenario's `reverse`.
     pub fn new(
         scenario: &Scenario,

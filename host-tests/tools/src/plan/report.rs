@@ -244,12 +244,12 @@ pub struct WayBack {
     pub worst_back: f64,
     /// SIR of the worst hop in the direction from Rx to Tx, dB.
     pub worst_back_db: f64,
-    /// Required SIR toward Tx as a fraction of that toward Rx; absent in a plan for one direction.
+    /// Required SIR toward Tx, as a fraction of the SIR toward Rx; absent for data toward Rx only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
     /// SIR of the worst hop toward Rx or Tx, linear; SIRs toward Tx are first divided by `reverse`.
     ///
-    /// Absent in a plan for one direction.
+    /// Absent in a plan for data toward Rx only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_both: Option<f64>,
     /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if they are equal.
@@ -257,7 +257,7 @@ pub struct WayBack {
     /// SIRs toward Tx are first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_direction: Option<&'static str>,
-    /// Node that receives the worst hop for data from Rx to Tx: 0 for Tx, otherwise a relay's index.
+    /// Receiver of the worst hop for data from Rx to Tx: 0 for Tx, otherwise the relay's index.
     #[serde(skip)]
     hop: usize,
     #[serde(skip)]
@@ -295,7 +295,7 @@ const NOT_MODELLED: &str = "not modelled: terrain and obstacles";
 const NOT_IN_TERRAIN: &str =
     "not modelled: buildings and trees, and terrain in front of the interferers";
 
-/// Text at the end of a plan for one direction.
+/// Text at the end of a plan for data toward Rx only.
 const ONE_WAY: &str = "; not optimised: the way back from Rx to Tx";
 
 /// Report of `cargo plan`, printed as a table or as JSON.
@@ -307,10 +307,12 @@ pub struct PlanReport {
     /// Error message for the user; absent if there is a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best SIR found, linear; present only if the request cannot be met.
+    /// Best SIR found for the worst hop, linear; present only if the request cannot be met.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
-    /// Best SIR found, dB; present only if the request cannot be met and the SIR is above 0.
+    /// Best SIR found for the worst hop, dB.
+    ///
+    /// Present only if the request cannot be met and the SIR is above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
     /// SIR of the plan's worst hop, linear.
@@ -360,7 +362,7 @@ pub struct PlanReport {
     ///
     /// For Theorem 3 it is the edge of the allowed positions: 1 lowest, 2 highest, 3 above Rx. For one relay with a
     /// lateral offset: 1 where the circles of equal SIR touch, 2 the maximum of the first hop's SIR, 3 above Rx, 4 to 6
-    /// an edge of the allowed positions along x, along y or upward, 7 and 8 with the interferer at Tx or Rx. For one
+    /// an edge of the allowed positions along x, along y or upward, 7 interferer at Tx, 8 interferer at Rx. For one
     /// relay and both directions: 1 above Tx, 2 above Rx, 3 where two SIRs are equal, 4 the maximum of one SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
@@ -396,7 +398,9 @@ pub struct PlanReport {
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
-    /// Results of how well relays locate the interferer in its area; absent without `[listen]`.
+    /// Report on how well relays locate the interferer in its area.
+    ///
+    /// Absent without the scenario's section `[listen]`, with which relays estimate an interferer from measurements.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub locating: Option<Locating>,
     /// True if relays may have a lateral position. The table then has a column for y.

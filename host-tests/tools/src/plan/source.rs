@@ -15,7 +15,7 @@ use super::{
     one_both_ways,
 };
 
-/// Returns the plan with the fewest relays that meet the SIR `target`; relays keep their own altitudes.
+/// Returns the plan with the fewest relays that meet the SIR `target`; the altitudes are fixed.
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     let how = if scenario.reverse > 0.0 {
         "the paper's optimisation problem (Opt), for both directions"
@@ -71,7 +71,9 @@ pub(super) fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f6
     Scene::new(scenario, relays).is_some_and(|scene| excludes(&scene, targets))
 }
 
-/// Returns the best positions of Algorithm 1 for data in both directions; `proven` if there is a proof.
+/// Returns the best positions of Algorithm 1 for data in both directions.
+///
+/// `proven` is set if it is proven that no positions are better.
 pub(super) fn best_both_ways(
     scenario: &Scenario,
     relays: u16,
@@ -188,7 +190,9 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
     ))
 }
 
-/// Returns the plan of Algorithm 1 for relays at their own altitudes, computed without messages.
+/// Returns the plan of Algorithm 1 for relays at fixed altitudes.
+///
+/// The plan is computed directly, without a simulation of the relays' messages.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let target = solved(&briefed)?;
@@ -208,7 +212,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// Returns the target SIR, linear, that the relays would agree on.
+/// Returns the target SIR, linear, that the relays of `briefed` would agree on in flight.
 pub(super) fn solved(briefed: &ProfiledMission) -> Result<f32, NoPlan> {
     silent::solve(&briefed.mission, Schedule::Bracketed, |index| {
         briefed.profile(index)

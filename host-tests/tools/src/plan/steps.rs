@@ -36,10 +36,10 @@ const GAIN: f64 = 2e-5;
 /// If two chains have equal times, the search keeps the one whose last relay is farther from Tx.
 const SAME: f64 = 1e-4;
 
-/// Loss of hop length toward Tx that the search neglects, as a fraction of the distance Tx-Rx.
+/// Largest gain in hop length toward Tx that the search neglects, as a fraction of the distance Tx-Rx.
 const SLIGHT: f64 = 1e-6;
 
-/// Number of bisection steps, within one cell, for the farthest x at which a hop meets a rate step.
+/// Number of bisection steps in a cell for the farthest x at which a hop has the SINR of a rate step.
 const HALVINGS: u8 = 40;
 
 /// Beginning of a chain: the hops from Tx to the relay at `point`. Together they need `time` for one bit, s Hz.
@@ -47,21 +47,21 @@ const HALVINGS: u8 = 40;
 struct Label {
     point: Point,
     time: f64,
-    /// Index of the chain that this chain continues, among those that end at the previous relay.
+    /// Index of the chain without its last hop, in the list of chains that end at the previous relay.
     before: usize,
 }
 
 /// Tables of one hop: limits of its sender's x, and its time for one bit.
 struct Reaches {
     hop: Hop,
-    /// Smallest x of the sender, m, at which the receiver meets a rate step.
+    /// Smallest x of the sender, m, at which the receiver has the SINR that a rate step requires.
     ///
     /// There is a row for each rate step, with a value for each x of the receiver on the grid. Infinite if the hop
     /// would be shorter than the minimum separation.
     nearest: Vec<Vec<f64>>,
     /// Lower bounds on the hop's time for one bit, s Hz.
     ///
-    /// There is a row for each cell of the sender, with a value for each cell of the receiver.
+    /// There is a row for each cell (interval of x) of the sender, with a value for each cell of the receiver.
     least: Vec<f64>,
 }
 
@@ -181,9 +181,9 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the start of each cell, and the least interference plus noise of relay `node` in it.
+    /// Returns the smallest x of each cell, and the least interference plus noise of relay `node` there.
     ///
-    /// It is the smaller of the values at the two edges of the cell, W.
+    /// The least interference plus noise, W, is taken as the smaller of the values at the two edges of the cell.
     fn quietest(&self, node: usize) -> Vec<Point> {
         let points: Vec<Point> = self
             .grid
@@ -200,7 +200,7 @@ impl Search<'_> {
 
     /// Returns lower bounds on the time for one bit of all hops after a relay, s Hz.
     ///
-    /// There is a row for each relay, with a value for each cell of the relay.
+    /// There is a row for each relay, with a value for each cell (interval of x) in which the relay may be.
     fn bounds(&self, kinds: &[Rc<Reaches>]) -> Vec<Vec<f64>> {
         let relays = kinds.len();
         let (last, rx) = (self.times.hop(Some(relays), None), self.times.rx());
@@ -236,7 +236,7 @@ impl Search<'_> {
         cell
     }
 
-    /// Extends each chain of `labels` by a hop to relay `node`. Returns the chains that are worth keeping.
+    /// Extends each chain of `labels` by a hop to relay `node`. Returns the chains that may lead to the best chain.
     ///
     /// `limit` is the largest permitted x of relay `node`, m. `bound` has a value for each cell that the relay may be
     /// in: a lower bound on the time for one bit of all hops after the relay, s Hz.
@@ -287,9 +287,10 @@ impl Search<'_> {
         self.undominated(found, &backward)
     }
 
-    /// Collects in `ends` the x of relay `node`, m, at which its hop from `from` just meets a rate step.
+    /// Collects in `ends` each x, m, of relay `node` at which its hop just has the SINR of a rate step.
     ///
-    /// The hop counts in both directions of data. The x of Rx is included. The list is not sorted.
+    /// The hop starts at `from`, and is examined for data toward Rx and for data toward Tx, if any. The x of Rx is
+    /// included. The list is not sorted.
     fn ends(&self, from: Point, node: usize, kind: &Reaches, ends: &mut Vec<f64>) {
         ends.clear();
         ends.push(self.times.scene.distance_m);
@@ -321,10 +322,10 @@ impl Search<'_> {
         }
     }
 
-    /// Returns those of `labels` (first hops of chains) that can lead to the best chain.
+    /// Returns those of `labels` (beginnings of chains) that can lead to the best chain.
     ///
-    /// Label a is left out if a label b ends farther from Tx, takes no more time, and is no worse for data to Tx. b is
-    /// no worse if it receives the next node from as far away as a does.
+    /// Label a is left out if a label b ends farther from Tx, takes no more time, and at every rate step receives data
+    /// toward Tx from a next node at the same or a larger x.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -348,10 +349,10 @@ impl Search<'_> {
     }
 }
 
-/// Table of the farthest x of the next node that a relay can receive in the direction to Tx.
+/// Range of a hop for data toward Tx: the largest x at which a relay can receive the next node.
 ///
-/// It depends on the relay's x and on the rate step. The search uses it to compare a relay at a smaller x with one at a
-/// larger x.
+/// The value depends on the relay's x and on the rate step. The search uses the table to compare a relay at a smaller x
+/// with one at a larger x.
 struct Backward {
     hop: Hop,
     /// Largest x of the next node, m, at which a relay at a grid point receives it at a rate step.
@@ -360,7 +361,8 @@ struct Backward {
     farthest: Vec<Vec<f64>>,
     /// x of the useful grid points, m.
     ///
-    /// At some rate step, a useful point can receive a more distant node than a grid point with a larger x can.
+    /// A grid point is useful if a relay there can receive, at some rate step, a more distant next node than a relay at
+    /// some grid point with a larger x.
     useful: Vec<f64>,
 }
 
@@ -404,9 +406,10 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the smallest x, m, such that no position from there to `point` is better than `point`.
+    /// Returns the smallest x, m, from which on no position up to `point` is better than `point`.
     ///
-    /// A position is better if it receives the next node from a larger x, at some rate step of the direction to Tx.
+    /// A position is better if a relay there receives the next node at a larger x, at some rate step of the data toward
+    /// Tx.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;

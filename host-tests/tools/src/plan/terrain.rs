@@ -16,7 +16,7 @@ use crate::figures::chart::{Axis, Chart, Line, Look, Stroke};
 
 /// Position error of a relay, m, if the scenario has no `companion.position_error_m`.
 ///
-/// It is the companion's default.
+/// It is the default of the program on the relay's companion computer.
 pub const POSITION_ERROR_M: f64 = 1.0;
 
 /// Elevation model of a scenario.
@@ -30,7 +30,7 @@ pub struct Elevation {
 }
 
 impl Elevation {
-    /// Reads the elevation files `dem`, or without any, those of the scenario; `None` without any file.
+    /// Reads the elevation files `dem`, or those of the scenario if `dem` is empty; `None` without files.
     ///
     /// # Errors
     /// A text that names the file and the problem.
@@ -59,7 +59,8 @@ impl Elevation {
     /// Returns the terrain along the line Tx-Rx of `scenario`.
     ///
     /// # Errors
-    /// A text that names the site: the scenario has none, the files do not cover it, or its height contradicts them.
+    /// A text that names the reason: no Tx and Rx sites in the scenario, a site that the files do not cover, or a site
+    /// whose height contradicts the files.
     pub fn ground(&self, scenario: &Scenario) -> Result<Ground<'_>, String> {
         let line = scenario.line.as_ref().ok_or("site: is missing")?;
         let ground = Ground::new(&self.terrain, line.axis, line.sites, self.spec.mast_m)?;
@@ -68,7 +69,8 @@ impl Elevation {
 
     /// Returns the scene of `relays` relays, with interferers that stand on the ground.
     ///
-    /// `None` in a field of interference. An interferer that the files do not cover is at altitude 0.
+    /// `None` if the scenario lists no interferer, for example because it has the interference along the line Tx-Rx. An
+    /// interferer that the files do not cover is at altitude 0.
     ///
     /// # Errors
     /// Those of [`ground`](Self::ground).
@@ -84,7 +86,7 @@ impl Elevation {
         }))
     }
 
-    /// Returns the lowest and highest altitude of each interferer; empty in a field of interference.
+    /// Returns the lowest and highest altitude of each interferer; empty if the scenario lists none.
     fn interferers(&self, scenario: &Scenario) -> Result<Vec<InterfererHeight>, String> {
         let Interference::Sources(sources) = &scenario.interference else {
             return Ok(Vec::new());

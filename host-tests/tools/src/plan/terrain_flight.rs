@@ -31,7 +31,7 @@ const LEVELS: u32 = 40;
 /// Largest number of searches for altitudes. Each search uses the x that the relays choose at the previous altitudes.
 const ROUNDS: u32 = 6;
 
-/// First and last change of one relay's altitude in the search, m.
+/// Largest and smallest change of one relay's altitude in the search, m. The search begins with the largest.
 const STEPS_M: [f64; 2] = [16.0, 0.5];
 
 /// Largest relative loss of SIR that is accepted for higher, safer altitudes: 0.01 dB.
@@ -43,7 +43,9 @@ const GAIN: f64 = 1e-4;
 /// Explanation of "room" for the user.
 pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, no clear hop becomes grazing (ground in the first Fresnel zone), and no relay is in a no-fly area; none: a drift by the position error is too much";
 
-/// Scenario with altitudes, the positions that relays choose in it, and the rank of this chain.
+/// Scenario with altitudes, the positions that relays choose in it, and the rank of these positions.
+///
+/// The rank is the SIR of the worst hop, linear, reduced to nearly 0 if a position is not permitted.
 struct Trial {
     scenario: Scenario,
     chain: Vec<Candidate>,
@@ -211,7 +213,7 @@ pub struct Flight {
     /// Blocked hops that `--allow-blocked` accepts; absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blocked: Option<String>,
-    /// Reasons why relays have no room, one for each such relay.
+    /// Reasons why relays have no room (interval of x in which a relay may drift), one for each such relay.
     #[serde(skip)]
     confined: Vec<String>,
     /// Chains after the loss of each relay; empty for one relay and for more than 50.
@@ -310,7 +312,7 @@ impl Flight {
             .then(|| format!("more than {MOST_RELAYS} relays"))
     }
 
-    /// Returns warnings: accepted blocked hops, relays without a room, and problems after a loss.
+    /// Returns warnings: accepted blocked hops, relays without room to drift, and problems after a loss.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let blocked = self.blocked.iter();
         let blocked = blocked.map(|line| format!("{line}; accepted by --allow-blocked"));
@@ -321,7 +323,7 @@ impl Flight {
         }))
     }
 
-    /// Returns the text about the room of relay `index`; empty if the relay is unknown.
+    /// Returns the text about the room (interval of x) of relay `index`; empty for an unknown relay.
     pub fn room(&self, index: u16) -> String {
         let relay = self.relays.iter().find(|relay| relay.index == index);
         match relay.map(|relay| relay.room_m) {
@@ -372,10 +374,10 @@ impl fmt::Display for Flight {
     }
 }
 
-/// Cuts `room` to the part around `place` that is outside of all no-fly areas.
+/// Cuts `room` (interval of x) to the part around the relay's `place` outside of all no-fly areas.
 ///
-/// The areas are enlarged by the position error `error_m`, m. Returns the reason if the relay is inside an area, and so
-/// has no room.
+/// The areas are enlarged by the position error `error_m`, m. If the relay is inside such an area, `room` becomes
+/// `None`, and the reason is returned.
 fn cut(
     room: &mut Option<[f64; 2]>,
     place: &Placement,

@@ -21,7 +21,7 @@ use super::config::{
 pub enum BlockError {
     /// Error: the scenario is not a valid mission, for this reason.
     Refused(Refusal),
-    /// Error: the interference has this many points, too many for a block.
+    /// Error: the interference is given at this many points, more than a block can hold.
     Points(usize),
     /// Error: the drone would reject the configuration, for this reason.
     Config(ConfigError),
@@ -110,7 +110,8 @@ pub struct Flight {
 impl Flight {
     /// Creates the configuration of `uavs` relays in `scenario`, with the network number `network`.
     ///
-    /// The method is `align`, without measurements. `tolerance` is the relative tolerance of the SIR.
+    /// The placement method is `align`, and relays do not measure the interference. `tolerance` is the relative
+    /// tolerance of the SIR.
     ///
     /// # Errors
     /// [`BlockError`] if the scenario is not a valid mission, or does not fit into a block.
@@ -151,7 +152,7 @@ impl Flight {
         Self { method, ..self }
     }
 
-    /// Sets the time slots to those of `scenario`, if the method is the joint method.
+    /// Sets the time slots to those of `scenario`, if the placement method is [`Method::Joint`].
     ///
     /// # Errors
     /// [`BlockError::Refused`] if the relays cannot use slots that are as long as each hop needs.
@@ -211,7 +212,9 @@ impl Flight {
         &self.mission
     }
 
-    /// Returns the profiles (power, altitude) of relays that differ from the common one, by index from 1.
+    /// Returns the profiles (power, altitude) that differ from the mission's common profile.
+    ///
+    /// Each has its relay's index, from 1.
     pub fn profiles(&self) -> &[(u16, Profile)] {
         &self.own
     }
@@ -302,7 +305,7 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
 /// firmware's default. `name` is the name of the scenario, for errors.
 ///
 /// # Errors
-/// A text with the key whose value no block can have, this value, and the allowed value.
+/// A text with the scenario key whose value no block can have, the value, and the allowed value.
 pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> Result<u32, String> {
     let refuse = |key: &str, value: u32, own: u32, why: &str| {
         format!(

@@ -40,7 +40,7 @@ const INT: u8 = 6;
 /// PX4 type of a parameter with decimals, `MAV_PARAM_TYPE_REAL32`.
 const FLOAT: u8 = 9;
 
-/// Data of the flight that a bundle is made for.
+/// Data of the flight for which a bundle (folders of the drones and of the ground station) is made.
 #[derive(Debug)]
 pub struct Bundle<'a> {
     /// Text of the scenario file, with a plan if the positions of the relays are known.
@@ -55,7 +55,7 @@ pub struct Bundle<'a> {
     pub method: &'a str,
     /// Mission that the relays load.
     pub mission: &'a Mission,
-    /// Profiles of the relays that differ from the mission's.
+    /// Profiles (power, altitude) that differ from the mission's common profile, by relay index.
     pub profiles: &'a [(u16, Profile)],
     /// Positions that the relays will agree on; empty if unknown.
     pub places: &'a [(Placement, Profile)],
@@ -74,7 +74,7 @@ pub struct Bundle<'a> {
     pub autopilot_key: Option<[u8; 32]>,
 }
 
-/// File of a bundle: name, mode, content.
+/// File of a bundle (folders of a flight): name, permission bits, content.
 type Content = (&'static str, u32, String);
 
 /// Autopilot parameter: name, type and value in PX4; name and value in ArduCopter. Each may be absent.
@@ -296,7 +296,7 @@ impl Bundle<'_> {
         Ok(file)
     }
 
-    /// Returns the geofence that the guard of relay `index` uses.
+    /// Returns the geofence of relay `index`, as its guard (collision avoidance) uses it.
     fn fence(&self, index: u16) -> uav_relay::Geofence {
         let own = self.profiles.iter().find(|(of, _)| *of == index);
         let profile = own.map_or(self.mission.config().common, |(_, profile)| *profile);
@@ -322,7 +322,7 @@ impl Bundle<'_> {
     /// Returns the parameters that the autopilot of relay `index` needs.
     ///
     /// # Errors
-    /// The highest altitude is above the range of a fence.
+    /// A text if the flight needs a higher geofence than ArduCopter permits.
     fn parameters(&self, index: u16) -> Result<Vec<Parameter>, String> {
         let config = self.mission.config();
         let fence = self.fence(index);

@@ -130,20 +130,21 @@ impl AsideCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile`, and its case; `None` in a field.
+/// Returns the optimal position of a relay with `profile`, and its case.
 ///
-/// x is between Tx and Rx, and y in the allowed lateral range. The relay has the altitude of `profile`. Work: 48
-/// bisection steps in f64; with noise 48 further steps for each of them. If the optimum is outside of the allowed
-/// ranges, some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
+/// `None` if the mission has no interferer. x is between Tx and Rx, and y in the allowed lateral range. The relay has
+/// the altitude of `profile`. Work: 48 bisection steps in f64; with noise 48 further steps for each of them. If the
+/// optimum is outside of the allowed ranges, some 300 evaluations of both hops; with noise and a lateral range some
+/// 23 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field.
+/// Returns the optimal position of a relay of `power_w` watts, and its case.
 ///
-/// x is between Tx and Rx; y and altitude are in their allowed ranges. Work: 48 bisection steps in f64; with noise 48
-/// further steps for each of them. If the optimum is outside of the allowed ranges, some 800 evaluations of both hops;
-/// with noise and a lateral range some 46 000 more.
+/// `None` if the mission has no interferer. x is between Tx and Rx; y and altitude are in their allowed ranges. Work:
+/// 48 bisection steps in f64; with noise 48 further steps for each of them. If the optimum is outside of the allowed
+/// ranges, some 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }
@@ -311,7 +312,7 @@ impl Plane {
         bisected(0.0, t, HALVINGS, rises).0
     }
 
-    /// Returns the point (x, y), m, on a circle about Rx with the first hop's largest SIR in noise.
+    /// Returns the point (x, y), m, of a circle about Rx at which the first hop's SIR in noise is largest.
     ///
     /// `s` is the radius of the circle, m.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {

@@ -167,9 +167,9 @@ impl Edge {
         best
     }
 
-    /// Returns the best position on the edge above `low` and up to `high`, m.
+    /// Returns the best position on the edge with the varying coordinate above `low` and up to `high`, m.
     ///
-    /// Each hop's SIR must only rise or only fall between the two.
+    /// Between `low` and `high` each hop's SIR must only rise or only fall.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -184,7 +184,7 @@ impl Edge {
     }
 }
 
-/// Returns the values in ascending order. A NaN is replaced by a value that is a number.
+/// Returns the values in ascending order. A copy of one of the other values replaces a NaN.
 fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, b) = (a.min(b), a.max(b));
     let (c, d) = (c.min(d), c.max(d));

@@ -125,12 +125,13 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
 
 /// Function phi(t) with the sign of the slope of the first hop's SIR at t on a straight line.
 ///
-/// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2. On a line along x p is the X of the interferer.
+/// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2, with the fields p, q, a, b and nu (`noise`). On a line along x, p
+/// is the interferer's x.
 #[derive(Debug)]
 pub(super) struct Slope<T> {
     /// t of the point closest to the interferer, m. The point closest to Tx has t = 0.
     pub(super) p: T,
-    /// Difference p^2 + a - b, m^2.
+    /// Term p^2 + a - b of phi, m^2, from the fields p, a and b.
     pub(super) q: T,
     /// Squared distance of the line from the interferer, m^2.
     pub(super) a: T,
@@ -149,9 +150,9 @@ impl<T: Real> Slope<T> {
         p * t - q - p * (b / t) - self.noise * s * s > T::from(0.0)
     }
 
-    /// Returns true if phi rises at `t`, m, for p > 0.
+    /// Returns true if the function phi rises at `t`, m. The field p must be above 0.
     ///
-    /// Beyond p the derivative of phi falls with t, so phi has at most one maximum there.
+    /// For t above p the derivative of phi falls with t, so phi has at most one maximum there.
     fn bends_up(&self, t: T) -> bool {
         let Self { p, a, b, .. } = *self;
         let s = (t - p) * (t - p) + a;
@@ -159,14 +160,16 @@ impl<T: Real> Slope<T> {
         half - T::from(2.0) * self.noise * s * (t - p) > T::from(0.0)
     }
 
-    /// Returns the only maximum of the SIR for p < 0, m. `peak` is the t that it would have if there were no noise.
+    /// Returns the t, m, of the only maximum of the first hop's SIR. The field p must be below 0.
+    ///
+    /// `peak` is the t of the maximum without noise.
     pub(super) fn hill(&self, peak: T) -> T {
         bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
     }
 
-    /// Returns the minimum and the maximum of the SIR for p > 0, m; `None` if the SIR only falls.
+    /// Returns the t, m, of the minimum and maximum of the first hop's SIR; `None` if the SIR only falls.
     ///
-    /// `bottom` is the minimum for a noise of 0.
+    /// The field p must be above 0. `bottom` is the t of the minimum without noise.
     pub(super) fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
         let bends_up = |t: T| self.bends_up(t);
         if !bends_up(bottom) {

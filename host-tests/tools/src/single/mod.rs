@@ -29,7 +29,7 @@ const HALVINGS: u8 = 40;
 
 /// Position of a single relay, and the SIR of the worse of its two hops, linear.
 ///
-/// In an interference field the SIR is a mean.
+/// If the interference is known as a distribution along the line Tx-Rx, the SIR is a mean.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Found {
     /// Position of the single relay.
@@ -68,9 +68,8 @@ impl TwoHops<'_> {
 
     /// Returns the position on a straight line at which both hops have the same SIR.
     ///
-    /// `is_low` returns true if a value of the varying coordinate is below the searched value. The search is from `low`
-    /// to `high`, m. `place` returns the position for a value. Of the two adjacent f32 values, the one with the better
-    /// SIR is returned.
+    /// Bisection of the line's varying coordinate from `low` to `high`, m: `is_low` returns true if a value is too
+    /// small, and `place` returns the position for a value. The result is the better of the last two values.
     fn crossing(
         &self,
         low: f32,

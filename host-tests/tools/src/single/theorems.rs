@@ -115,7 +115,7 @@ pub enum PlaceCase {
     ///
     /// At that minimum the first hop's SIR is still higher than the second hop's.
     OverValley = 5,
-    /// Optimum at the maximum of the first hop's SIR, which is still lower there than the second hop's.
+    /// Optimum at the maximum of the first hop's SIR. Even there it is lower than the second hop's SIR.
     ///
     /// The interferer is behind Tx.
     Hilltop = 6,
@@ -149,10 +149,10 @@ impl PlaceCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile` and y = 0, and its case; `None` in a field.
+/// Returns the optimal position of a relay with `profile` and y = 0, and its case.
 ///
-/// The position is between Tx and Rx. Valid for any valid mission. Work: at most 90 evaluations of both hops, and with
-/// noise 230 more.
+/// The position is between Tx and Rx. `None` if the mission has no interferer. Work: at most 90 evaluations of both
+/// hops, and with noise 230 more.
 pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
     let two = Two::new(mission, profile);
@@ -229,7 +229,7 @@ pub enum AltitudeCase {
     Crossing = 2,
     /// Optimum at the lowest altitude, or at the altitude of the first hop's largest SIR.
     ///
-    /// The two hops' SIRs are equal at no altitude in between.
+    /// Between these two altitudes the SIRs of the two hops are equal nowhere.
     End = 3,
     /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,
@@ -247,8 +247,8 @@ impl AltitudeCase {
 
 /// Returns the optimal position at `x_m` within the mission's altitudes, and its case.
 ///
-/// The relay has `power_w` watts. `None` in an interference field, and for `x_m` outside [0, D], from Tx to Rx. Work:
-/// at most six evaluations of both hops and one of Lemma 1.
+/// The relay has `power_w` watts. `None` if the mission has no interferer, or if `x_m` is not from 0 (Tx) to D (Rx).
+/// Work: at most six evaluations of both hops and one of Lemma 1.
 pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, AltitudeCase)> {
     let interferer = mission.interferer()?;
     if !(0.0..=mission.config().distance_m).contains(&x_m) {
@@ -321,8 +321,8 @@ pub enum FreeCase {
 
 /// Returns the optimal x and altitude of a relay of `power_w` watts with y = 0, and its case.
 ///
-/// x is between Tx and Rx, and the altitude in the mission's range. `None` in an interference field. Work: at most 190
-/// evaluations of both hops and one of Lemma 1.
+/// x is between Tx and Rx, and the altitude in the mission's range. `None` if the mission has no interferer. Work: at
+/// most 190 evaluations of both hops and one of Lemma 1.
 pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     let config = mission.config();
     let level = |altitude_m: f32| {
@@ -361,16 +361,18 @@ pub struct Guide {
     pub c1: f32,
     /// Ratio C_2: above it, the first hop has a higher SIR than the second even vertically above Rx.
     pub c2: f32,
-    /// Ratio C_3: above it, the first hop has a higher SIR than the second even where its SIR is minimal.
+    /// Ratio C_3: above it, the first hop has a higher SIR than the second even at the first hop's minimum.
     ///
-    /// This minimum is between Tx and Rx, or beyond Rx. `None` if there is no minimum, for example for an interferer at
-    /// X <= 0. With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
+    /// This minimum of the first hop's SIR along x is between Tx and Rx, or beyond Rx. `None` if there is no minimum,
+    /// for example for an interferer at X <= 0. With noise the SIR has a minimum and then a maximum; C_3 belongs to the
+    /// minimum.
     pub c3: Option<f32>,
 }
 
-/// Returns the power ratios C_1 to C_3 for a relay at `altitude_m`, m, above 0. `None` in an interference field.
+/// Returns the power ratios C_1 to C_3 for a relay at `altitude_m`, m, above 0.
 ///
-/// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems/`. Constant work.
+/// `None` if the mission has no interferer. Relative error below 1e-4: `the_guide_agrees_with_the_cases` in
+/// `host-tests/tests/theorems/`. Constant work.
 pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
     let interferer = mission.interferer()?;
     let config = mission.config();
@@ -395,9 +397,9 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
 
 /// Returns the altitudes at which both hops have the same SIR, m: the paper's h^- and h^+.
 ///
-/// The lower altitude is first. The relay has `power_w` watts and is at `x_m`; neither is limited to the mission's
-/// ranges. Altitudes are above 0, and not limited to the mission's range. An altitude that does not exist is `None`; in
-/// an interference field both are `None`. Constant work.
+/// The lower altitude is first; both are above 0. The relay has `power_w` watts and is at `x_m`. The mission's ranges
+/// limit neither `power_w` nor `x_m` nor the altitudes. An altitude that does not exist is `None`; without an
+/// interferer both are `None`. Constant work.
 pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
     let Some(interferer) = mission.interferer() else {
         return [None; 2];

@@ -83,8 +83,9 @@ fn best_of(two: &Two, low: f32, high: f32) -> Found {
 
 /// Returns the optimal position of a relay with `profile`; `None` if the mission has no field.
 ///
-/// The relative difference from the best SIR is at most 1e-5. Work: at most 260 evaluations of both hops per field
-/// point; not for a relay's main loop.
+/// A field is the distribution of the interference at some points along the line Tx-Rx. The relative difference from
+/// the best SIR is at most 1e-5. Work: at most 260 evaluations of both hops for each point; not for a relay's main
+/// loop.
 pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     let field = mission.heard()?;
     let two = Two::new(mission, profile);
@@ -119,8 +120,9 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
 
 /// Returns both extrema of the first hop's mean SIR along x, ascending, m.
 ///
-/// `upsilon` = E[1/I] is linear in [`low`, `high`]. For Upsilon = a + b x the extrema are the roots of b x^2 + 2 a x -
-/// b h^2 = 0, with the altitude h. If Upsilon is constant, both results are `high`.
+/// `upsilon` is E[1/I], the mean of the inverse interference power, and is linear in [`low`, `high`]. If it is a + b x
+/// there, and h is the altitude, the extrema are the roots of b x^2 + 2 a x - b h^2 = 0. If it is constant, both
+/// results are `high`.
 fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (upsilon(low), upsilon(high));
     let b = (at_high - at_low) / (high - low);
@@ -138,9 +140,9 @@ fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> 
 
 /// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon`.
 ///
-/// `epsilon` is linear, above 0. `None` if the mission has no field. The algorithm evaluates only positions at which
-/// the second hop's mean SIR equals a target. It can miss the optimum of a field that changes a lot between two such
-/// positions. Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// `epsilon` is linear, above 0. `None` without a field (interference distribution along the line Tx-Rx). Only
+/// positions at which the second hop's mean SIR equals a target are evaluated. An optimum between them can be missed.
+/// Work: at most `most` evaluations, and at most the first target SIR divided by `epsilon`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two::new(mission, profile);

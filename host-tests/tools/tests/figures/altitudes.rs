@@ -35,7 +35,9 @@ fn chains_at_one_altitude_agree_with_the_reference() {
     }
 }
 
-/// Checks the SIRs with the paper's step of 0.1 against the reference, from 195 m to 230 m.
+/// Checks the SIRs with the paper's steps of 0.1 in the target SIR against the reference.
+///
+/// The altitudes are 195 m to 230 m.
 #[test]
 fn the_step_ends_where_the_reference_does() {
     let table = Table::read("altitude");
@@ -101,7 +103,8 @@ fn chain_shapes_have_the_sir_of_their_round() {
 
 /// Checks Algorithm 2 against a separate program that maximises each relay's SIR exactly.
 ///
-/// The SIR never falls, and stays below the joint optimum. The search on a coarse grid gains nothing.
+/// From round to round the chain's SIR never falls, and it stays below the joint optimum of all relays. Algorithm 2
+/// with a coarse grid gains nothing.
 #[test]
 fn rounds_rise_as_exact_local_search_does() {
     let table = Table::read("rounds");

@@ -302,7 +302,7 @@ fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {
     integral(alpha - 2.0) / integral(alpha - 1.0)
 }
 
-/// Returns a reference link in the field that the figure's table calls `field`.
+/// Returns a reference link in the interference field with the name `field` in the figure's table.
 ///
 /// It has `relays` relays of 1 W at 20 m.
 fn field_link(field: &str, relays: usize) -> StochasticLink {
@@ -408,9 +408,9 @@ fn algorithm_4_ends_where_the_reference_program_does() {
     }
 }
 
-/// Checks that steps of 0.1 in the target SIR miss the optimum SIR of eight relays.
+/// Checks that target SIRs in steps of 0.1 miss the optimum SIR of eight relays.
 ///
-/// The optimum is 0.0912; the steps end near 0. The page of the figures says so.
+/// The optimum is 0.0912; the search in steps ends with an SIR near 0. The page of the figures says so.
 #[test]
 fn a_step_of_a_tenth_finds_little_for_eight_relays() {
     let last = |relays: u16| {

@@ -31,7 +31,7 @@ fn the_rates_are_those_of_the_sirs_and_both_ways_cost_some() {
     }
 }
 
-/// Checks that the README states the figure's numbers for eight relays.
+/// Checks that the README has the SIRs of the figure `link` for eight relays and both directions.
 #[test]
 fn the_readme_says_what_both_ways_give() {
     let table = Table::read("link");

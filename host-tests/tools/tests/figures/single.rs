@@ -7,7 +7,7 @@ use uav_relay_tools::figures::single::{ALTITUDES_M, REALISATIONS};
 
 use super::{Table, off, within};
 
-/// Returns the paper's dual-hop link (third part of its table) in the reference's form.
+/// Returns the reference model of the paper's dual-hop link (third part of the paper's table).
 fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     Link {
         distance_m: 35.0,
@@ -235,7 +235,9 @@ fn every_definition_of_the_gain_has_its_value() {
     );
 }
 
-/// Checks that no pair of powers has the printed gain of 30.14 % over random positions in linear SIR.
+/// Checks that no pair of powers has the paper's gain of 30.14 % over random positions of the relay.
+///
+/// The gain is computed from linear SIRs.
 #[test]
 fn no_linear_definition_gives_the_papers_gain() {
     let table = Table::read("single-gains");

@@ -20,8 +20,8 @@ use super::{changed, example, field, in_a_field, paper, reads, with};
 /// Returns the expected bytes of a block of the paper's scenario with some changes.
 ///
 /// `method` has the number of the method, a flag (true for a fixed altitude), and the parameters of `adjust`. `band`
-/// has the lowest and the highest altitude. `noise` has the interferer, and the bytes from the number of field points
-/// on.
+/// has the lowest and the highest altitude. `noise` has the interferer, and the bytes that begin with the number of
+/// field points.
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;

@@ -354,7 +354,7 @@ fn wrong_requests_for_fitted_slots_and_free_altitudes_are_named() {
     }
 }
 
-/// Checks that fitted slots with free altitudes are planned by the relays' own method.
+/// Checks that fitted slots with free altitudes are planned by the joint method, as on board.
 ///
 /// No number of relays is proven to be the best one.
 #[test]

@@ -45,7 +45,7 @@ const EVEN: usize = 171;
 /// Number of equal cells between Tx and Rx whose edges are also tried, for a radio with rate steps.
 const CELLS: usize = 400;
 
-/// Largest number of chains that each cell keeps, for a radio with rate steps.
+/// Largest number of unfinished chains that are kept for each cell, for a radio with rate steps.
 const KEPT: usize = 4;
 
 /// Inverse of the golden ratio, for golden-section search.
@@ -215,10 +215,10 @@ impl Chain {
 
     /// Returns the x of the relays with the largest rate for a radio with rate steps, m.
     ///
-    /// There is a list of x for each number of relays from 1. The search extends chains from Tx relay by relay. Each
-    /// cell of a grid keeps the few unfinished chains with the least times that end there; if times are equal, it keeps
-    /// the chain that ends farther from Tx. The next relay is tried at all grid points, and at all x at which the time
-    /// of the hop changes.
+    /// There is a list of x for each number of relays from 1. The search extends chains from Tx relay by relay. In each
+    /// cell of a grid it keeps the few unfinished chains with the least times; of chains with equal times, the one that
+    /// ends farther from Tx. It tries the next relay at all grid points, and at all x at which the time of the hop
+    /// changes.
     fn by_changes(&self) -> Vec<Vec<f64>> {
         let mut grid = self.grid();
         grid.extend((0..=CELLS).map(|i| self.distance_m * i as f64 / CELLS as f64));
@@ -342,7 +342,7 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rates of all relays that two searches find, bit/s/Hz.
+    /// Returns the largest data rates found by two searches with all relays of the chain, bit/s/Hz.
     ///
     /// The first search starts from its own grid. The second search also starts from the x in `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {

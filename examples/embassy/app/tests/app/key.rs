@@ -41,8 +41,8 @@ fn neighbours_accept_the_epoch_of_every_start() {
 
 /// Checks that a relay is rejected if it restarts with an old epoch, or with its last epoch and seed.
 ///
-/// Its frames could be replays of earlier ones. A test in the library covers the same epoch with a different seed, as
-/// of a second relay with the same index.
+/// The frames of such a relay could be replays of earlier frames. A test in the library covers a second relay with the
+/// same index and epoch, but a different seed.
 #[test]
 fn frames_with_a_forgotten_epoch_are_rejected() {
     for (epoch, seed) in [(1, 2), (2, 1)] {

@@ -21,11 +21,10 @@ fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
 
-/// Checks that a relay restarted three times never votes for an older view.
+/// Checks that a relay restarted three times never votes for an older view (set of members).
 ///
-/// That is, the promised view number must never decrease.
-///
-/// The other two relays fly on and readmit it.
+/// The number of the promised view must never decrease. The remaining two relays fly on, and readmit the restarted
+/// relay.
 #[test]
 fn no_promise_is_forgotten_over_reboots() {
     let flash = Ram::blank();
