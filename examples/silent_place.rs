@@ -7,8 +7,8 @@
 use uav_relay::channel::{AirGround, Channel};
 use uav_relay::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
-/// Channel at 2 GHz. Excess losses: 0.1 dB with line of sight and 21 dB without, as factors. The build fails if a value
-/// is out of range.
+/// Channel at 2 GHz. The excess losses are 0.1 dB with line of sight and 21 dB without it, given as factors. The build
+/// fails if a value is out of range.
 const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
     Ok(channel) => channel,
     Err(_) => panic!("a channel parameter is out of range"),

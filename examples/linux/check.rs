@@ -2,16 +2,18 @@
 
 use uav_relay::{Duration, Instant};
 
-/// Result of one item of a check: `Ok` is green, `Err` is red.
+/// Result of one checked item, with its text: `Ok` means passed (green), `Err` means failed (red).
 pub type Finding = Result<String, String>;
 
-/// Returns the colour of a result.
+/// Returns the colour word of a checked item: `green` if `is_green` (passed), otherwise `red`.
 #[must_use]
 pub const fn colour(is_green: bool) -> &'static str {
     if is_green { "green" } else { "red" }
 }
 
-/// Returns the last line of a check: how many of `all` items are red. `items` is the plural noun for them.
+/// Returns the last line of a check: how many of its `all` items are red (failed).
+///
+/// `items` is the noun for the items in this line, such as `relays`.
 ///
 /// # Errors
 /// The line, if at least one item is red.
@@ -23,7 +25,7 @@ pub fn verdict(red: usize, all: usize, items: &str) -> Finding {
     }
 }
 
-/// Condition for the end of a check: all items green for `green_for`, or the time `limit`.
+/// End of a check: all items have stayed green (passed) for `green_for`, or the time `limit` has come.
 #[derive(Debug)]
 pub struct End {
     /// Time at which the check ends even if an item is red.
@@ -35,7 +37,9 @@ pub struct End {
 }
 
 impl End {
-    /// Updates the state; `are_green` is true if all items are green now. Returns true at the end of the check.
+    /// Records the present state of the items, and returns true at the end of the check.
+    ///
+    /// `are_green` is true if all items are green (passed) at `now`.
     pub fn is_reached(&mut self, now: Instant, are_green: bool) -> bool {
         let since = self.green_since.filter(|_| are_green);
         self.green_since = are_green.then(|| since.unwrap_or(now));

@@ -10,7 +10,7 @@ use crate::config::{self, FileOnlySettings, FileOptions};
 
 /// Parses the command line and the file named by `--config`.
 ///
-/// `section` reads the section of the file that no other program reads.
+/// `section` adds the options from the section of the file that only this program reads, such as `[companion]`.
 ///
 /// # Errors
 /// The exit status after `--help` or a mistake; the message has been printed.
@@ -53,7 +53,7 @@ pub fn refuse(line: &str) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Writes one line to standard error. Unlike `eprintln!` it does not panic on a closed stream.
+/// Writes one line to standard error. Unlike `eprintln!`, it does not panic if standard error is closed.
 pub fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -17,18 +17,18 @@ use crate::log::Log;
 use crate::mission::Method;
 use crate::site::degrees;
 
-/// Settings of the `--config` file that have no option.
+/// Settings of the `--config` file for which the command line has no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
     /// Path-loss parameters of the file; `None` for the default, the paper's channel.
     pub channel: Option<Channel>,
-    /// Interference along x in the file, if any.
+    /// Interference as a function of x (position along the line Tx to Rx), if the file gives it.
     pub field: Option<Interference>,
     /// Profiles (altitude and power) of single relays, with the relay's index.
     pub profiles: Vec<(u16, Profile)>,
-    /// Indices of the relays with a fixed altitude. The method chooses the altitudes of all other relays.
+    /// Indices of the relays with a fixed altitude. The placement method chooses the altitudes of all other relays.
     pub held: Vec<u16>,
-    /// Positions of the relays in the file's plan; empty without a plan.
+    /// Positions that the plan in the file gives to the relays; empty if the file has no plan.
     pub places: Vec<Placement>,
     /// Elevation model of the terrain below the line from Tx to Rx, if the file has one.
     pub terrain: Option<TerrainSpec>,
@@ -39,7 +39,7 @@ pub struct FileOnlySettings {
 impl FileOnlySettings {
     /// Rejects `--altitude` and `--uav-power` if relay `index` has its own `[[relay]]` profile in the file.
     ///
-    /// The relay would ignore these options.
+    /// A relay with such a profile would ignore these two options.
     ///
     /// # Errors
     /// One line that names the option and the file's table.
@@ -98,7 +98,7 @@ pub fn log_overrides(overrides: &[Override], log: &Log) {
     }
 }
 
-/// Options given by the `--config` file: names and values; `None` for flags without a value.
+/// Options given by the `--config` file: name and value of each. The value is `None` for a flag, which takes none.
 #[derive(Debug, Default)]
 pub struct FileOptions {
     options: Vec<(&'static str, Option<OsString>)>,
@@ -118,7 +118,7 @@ impl FileOptions {
         self.options.extend(path.map(|path| (name, Some(path))));
     }
 
-    /// Adds an option whose value is a path relative to the file's folder, or a `udp:` address.
+    /// Adds an option whose value is a `udp:` address, or a path relative to the file's folder.
     pub fn path_or_udp(&mut self, name: &'static str, place: Option<&String>) {
         match place {
             Some(path) if !path.starts_with("udp:") => self.path(name, Some(&PathBuf::from(path))),
@@ -150,9 +150,9 @@ impl FileOptions {
         })
     }
 
-    /// Removes options of the file that the command line repeats or excludes.
+    /// Removes the file's options that are also on the command line, or excluded by an option there.
     ///
-    /// Returns the other options, and the overrides: the removed options whose values differ from the command line.
+    /// Returns the remaining options, and the overrides: the removed options whose values differ from the command line.
     fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {
@@ -189,7 +189,7 @@ impl FileOptions {
 
 /// Returns the value of the option `name` on the command line, if the option is given.
 ///
-/// The value is empty if the option is the last word.
+/// The value is empty if no word follows the option on the command line.
 fn value_of(line: &[OsString], name: &str) -> Option<String> {
     let with_value = format!("{name}=");
     line.iter().enumerate().find_map(|(at, word)| {
@@ -202,7 +202,9 @@ fn value_of(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Returns true if two values are the same text or the same numbers. An empty `other` counts as the same.
+/// Returns true if two values of an option are the same text or the same numbers.
+///
+/// An empty `other` also counts as the same: it means that no word follows the option on the command line.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
@@ -222,7 +224,7 @@ const NEEDS_AUTOPILOT: [(&str, &str); 6] = [
     ("--descent", "descent_m_s"),
 ];
 
-/// Command-line options, each with the options of the file that it removes.
+/// Options of the command line, each with the options of the file that it excludes and removes.
 const EXCLUDES: [(&str, &[&str]); 6] = [
     ("--shared", &["--upstream", "--downstream"]),
     ("--upstream", &["--shared"]),
@@ -243,12 +245,11 @@ const EXCLUDES: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Merges the `--config` file into the command line. Returns the arguments from the file, followed by those of the
-/// command line.
+/// Merges the options of the `--config` file into the command line.
 ///
-/// The second result has the settings that only a file can give.
-///
-/// `section` reads the section of the file that no other program reads.
+/// Returns the arguments (first those of the file, then those of the command line), and the settings that only a file
+/// can give. `section` adds the options from the section of the file that only this program reads, such as
+/// `[companion]`.
 ///
 /// # Errors
 /// One line that states the fault in the file.
@@ -323,9 +324,9 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
     })
 }
 
-/// Adds the SNR gap of the file's fitted slots, if any, to the options `given`.
+/// Adds the SNR gap of fitted time slots to the options `given`, if the scenario has such slots.
 ///
-/// A fitted slot is as long as its hop needs.
+/// A fitted time slot is as long as its hop needs. Without fitted slots all slots are equal.
 fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), String> {
     let error = |refusal: mission::Refusal| refusal.to_string();
     let (mission, _) = mission::mission(scenario, 1, COMPANION_TOLERANCE).map_err(error)?;
@@ -335,7 +336,7 @@ fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), Stri
     Ok(())
 }
 
-/// Adds the mission of the file to the options `given`. Returns the settings without an option.
+/// Adds the mission of the file to the options `given`. Returns the file's settings that have no option.
 fn mission_options(
     scenario: &Scenario,
     given: &mut FileOptions,
@@ -418,7 +419,7 @@ fn place(planned: &PlannedPlace) -> Placement {
     }
 }
 
-/// Returns the scenario with a minimum separation of 0 m: so that any number of relays fits.
+/// Returns the scenario with a minimum separation of 0 m, so that any number of relays fits.
 fn without_separation(scenario: &Scenario) -> Scenario {
     Scenario {
         min_separation_m: 0.0,

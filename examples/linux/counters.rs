@@ -37,12 +37,12 @@ pub fn counted(stats: &Stats) -> Value {
 /// Interval between two checks of the frame counters.
 const EVERY: Duration = Duration::from_millis(2_000);
 
-/// Minimum number of frames rejected for one reason between two checks for a report of this reason.
+/// Minimum number of frames rejected for one reason between two checks before the reason is logged.
 const MANY: u32 = 3;
 
-/// Number of damaged frames between two checks for which the log suggests a wrong baud rate.
+/// Minimum number of damaged frames between two checks before the log suggests a wrong baud rate.
 ///
-/// The log suggests this only if no intact frame was received between the two checks.
+/// The log does not suggest this if an intact frame was received between the two checks.
 const DAMAGED: u32 = 10;
 
 /// Detector of reasons why frames are rejected. The detector compares the counters with those at the last check.
@@ -54,7 +54,7 @@ pub struct RejectionReasons {
 }
 
 impl RejectionReasons {
-    /// Returns a text about a new reason for rejected frames, if any. Each reason is returned once.
+    /// Returns a text about a reason for rejected frames that was not reported before; otherwise `None`.
     ///
     /// `signs` is true if this relay signs its frames.
     pub fn next_reason(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {

@@ -56,7 +56,8 @@ pub fn words(line: &[u8]) -> Result<Vec<&str>, String> {
 pub struct InvalidLines(u64);
 
 impl InvalidLines {
-    /// Counts an invalid line. The first one is logged as `event`, with the reason `why` and the valid forms.
+    /// Counts an invalid line. The first one is logged as an event named `event`, with the reason `why` and the valid
+    /// forms.
     pub fn refuse(
         &mut self,
         now: Instant,
@@ -98,7 +99,7 @@ pub struct Fifo {
 pub struct PartialLine(Vec<u8>);
 
 impl PartialLine {
-    /// Appends received bytes, and passes each complete line to `line`, without its line feed.
+    /// Appends received bytes, and calls `line` with each complete line, without its line feed.
     ///
     /// A line longer than [`LONGEST`] is cut to `LONGEST + 1` bytes.
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
@@ -140,7 +141,9 @@ impl Fifo {
         self.fd.as_fd()
     }
 
-    /// Reads the lines that have arrived since the last call, and passes each one to `line`. Work: at most 64 KiB.
+    /// Reads the lines that have arrived since the last call, and calls `line` with each line.
+    ///
+    /// One call reads at most 64 KiB.
     pub fn read(&mut self, mut line: impl FnMut(&[u8])) {
         let mut buffer = [0; 4096];
         for _ in 0..READS {

@@ -51,7 +51,7 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Request for a confirmation through the channel, after all earlier lines were written or dropped.
+    /// Request to confirm, through this channel, that all earlier lines were written or dropped.
     Flush(SyncSender<()>),
 }
 
@@ -126,7 +126,7 @@ impl Log {
         self.event(now, event, Value::Null, text);
     }
 
-    /// Logs that frames are signed, and the epoch.
+    /// Logs that frames are signed, and the signing epoch (counter of the program's starts).
     pub fn signed(&self, epoch: u32) {
         let what =
             format_args!("frames are signed; epoch {epoch} (start counter, larger at every start)");
@@ -166,7 +166,7 @@ fn appended(path: &Path) -> std::io::Result<File> {
 struct Writer {
     file: File,
     path: Option<PathBuf>,
-    /// True if only a part of the last line was written, for example on a full disk.
+    /// True if the last line is torn: only a part of it was written, for example because the disk is full.
     torn: bool,
     /// Number of dropped lines already reported in the log.
     reported_drops: u64,

@@ -15,10 +15,10 @@ pub const DISTANCE_M: [f32; 2] = [1.0, 1e6];
 /// Permitted range of an altitude, m.
 pub const ALTITUDE_M: [f32; 2] = [0.1, 1e4];
 
-/// Permitted range of the left limit of lateral offsets, y in m (facing the receiver).
+/// Permitted range of the left limit of relay positions: lateral position y, m (facing the receiver).
 pub const LEFT_M: [f32; 2] = [-1e5, 0.0];
 
-/// Permitted range of the right limit of lateral offsets, y in m (facing the receiver).
+/// Permitted range of the right limit of relay positions: lateral position y, m (facing the receiver).
 pub const RIGHT_M: [f32; 2] = [0.0, 1e5];
 
 /// Permitted range of a transmit power, W.
@@ -27,10 +27,10 @@ pub const POWER_W: [f32; 2] = [1e-6, 1e6];
 /// Permitted range of a noise power, W.
 pub const NOISE_W: [f32; 2] = [0.0, 1.0];
 
-/// Permitted range of `--reverse`: SIR toward the transmitter, relative to the SIR toward the receiver.
+/// Permitted range of `--reverse`: the required SIR toward Tx, divided by the SIR toward Rx.
 pub const REVERSE: [f32; 2] = [0.0, 1.0];
 
-/// Permitted range of `--fitted-gap` above 0: the SNR gap, a power ratio.
+/// Permitted range of `--fitted-gap`, if it is not 0: SNR gap of fitted time slots, a power ratio.
 pub const FITTED_GAP: [f32; 2] = [1.0, 1e3];
 
 fn fitted_gap(text: &str) -> Result<f32, String> {
@@ -120,9 +120,9 @@ pub struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// Returns the interference of the command line, else `field`, else that of the paper.
+    /// Returns the interference of the command line, otherwise `field`, otherwise the paper's interferer.
     ///
-    /// `field` is the file's interference along x.
+    /// `field` is the interference as a function of x (position along the line Tx to Rx) in the `--config` file.
     pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
@@ -197,7 +197,7 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
     })
 }
 
-/// Parses an interferer's power (W) and position (m), or the word `unknown`.
+/// Parses the value of `--interferer`: power (W) and position (m), or the word `unknown`.
 ///
 /// # Errors
 /// The expected form or range.

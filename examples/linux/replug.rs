@@ -37,7 +37,7 @@ pub struct Replug {
 struct Counts {
     read: u64,
     written: u64,
-    /// Number of bytes discarded instead of sent, while the tty was missing.
+    /// Number of bytes to send that were discarded, because the tty was missing.
     lost: u64,
     times_gone: u32,
 }
@@ -60,19 +60,19 @@ impl Replug {
         })
     }
 
-    /// Captures all further traffic of this tty with `tap`.
+    /// Adds `tap`, which captures all further traffic of this tty.
     pub fn tapped(&mut self, tap: Tap) {
         self.tap = Some(tap);
     }
 
-    /// Adds a comment about an operator's command to the next frame of the capture, if there is one.
+    /// Adds a comment about an operator's command to the tty's next captured frame, if it has a capture.
     pub fn note(&mut self, note: &str) {
         if let Some(tap) = &mut self.tap {
             tap.note(note);
         }
     }
 
-    /// Closes a failed tty, and reopens it when an attempt is due. Logs each loss and each return once.
+    /// Closes a tty that has failed, and reopens it after a pause. Logs each loss and each return of the tty once.
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {

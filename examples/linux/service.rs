@@ -34,7 +34,7 @@ pub struct Service {
     clock: Clock,
     socket: Option<StatusSocket>,
     signals: SignalDelivery<UnixStream, SignalOnly>,
-    /// True from a SIGHUP until the log is reopened.
+    /// True after a SIGHUP signal, until the log file is reopened.
     hangup: bool,
     /// True from a SIGUSR1 until the status is logged.
     asks_status: bool,
@@ -80,8 +80,8 @@ impl Service {
     ///
     /// Returns the time by which the next call is due, if any.
     ///
-    /// `answer` returns the answer to a request. Its argument is `None` for a request of the status, otherwise a
-    /// command and its sender. `who` names the program in the log line after a SIGHUP.
+    /// `answer` returns the program's answer to a request. Its argument is `None` for a request of the status,
+    /// otherwise a command and the command's sender. `who` is the name of the program in the log line after a SIGHUP.
     pub fn tend(
         &mut self,
         time: Instant,
@@ -111,11 +111,12 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// Sleeps until the time `wake`, if any, a signal, a request, or input on one of `ttys` or `others`.
+    /// Sleeps until the time `wake`, a signal, a status request, or input on one of `ttys` or `others`.
     ///
-    /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
+    /// Without `wake` the sleep has no time limit. A tty whose send buffer was full also ends the sleep when it accepts
+    /// bytes.
     ///
-    /// A full tty also ends the sleep when it accepts bytes again.
+    /// Returns the poll(2) events of each of `others`, and true after SIGINT or SIGTERM.
     pub fn sleep<'a>(
         &mut self,
         wake: Option<Instant>,

@@ -46,7 +46,7 @@ impl SiteOptions {
     }
 }
 
-/// Tx and Rx positions, displayed as on the command line.
+/// Tx and Rx positions, displayed as `between TX and RX`, each position as on the command line.
 #[derive(Clone, Copy, Debug)]
 pub struct Between(pub Sites);
 
@@ -57,7 +57,7 @@ impl fmt::Display for Between {
     }
 }
 
-/// Returns a position with latitude and longitude swapped, which is a frequent mistake.
+/// Returns a position with latitude and longitude swapped. Their wrong order is a frequent mistake.
 #[must_use]
 pub fn swapped(site: Geodetic) -> Geodetic {
     Geodetic {

@@ -14,10 +14,11 @@ use uav_relay::{Duration, Instant};
 
 use crate::lines::LONGEST;
 
-/// Maximum number of connections accepted per call of [`StatusSocket::questions`].
+/// Maximum number of new connections that one call of [`StatusSocket::questions`] accepts.
 const ANSWERS: usize = 4;
 
-/// Maximum number of incomplete requests. If there are more, the oldest ones count as complete.
+/// Maximum number of clients with an incomplete request. If there are more, the oldest requests count as complete, and
+/// are answered.
 const CLIENTS: usize = 16;
 
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -41,7 +42,7 @@ struct Client {
 #[derive(Debug)]
 pub struct Question {
     stream: UnixStream,
-    /// Command line of the client; `None` requests the state.
+    /// Command that the client has sent; `None` if the client requests the state.
     pub command: Option<String>,
 }
 
@@ -107,7 +108,7 @@ impl StatusSocket {
 impl Client {
     /// Reads from the client; returns true if the request is complete.
     ///
-    /// A request is complete after a line feed, the end of the stream, too many bytes or a timeout.
+    /// A request is complete after a line feed, at the end of the stream, above the maximum length, or after a timeout.
     fn is_complete(&mut self, now: Instant) -> bool {
         let mut bytes = [0; LONGEST];
         let has_ended = match self.stream.read(&mut bytes) {

@@ -36,7 +36,7 @@ fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     new.sync_all()
 }
 
-/// Returns the epoch of this start: the number in `file` plus one.
+/// Returns the signing epoch of this program start: the number in `file` plus one.
 ///
 /// The file is updated before the epoch is used, so that no epoch is used twice, even after a power failure.
 ///
@@ -89,7 +89,7 @@ pub struct StoredFile {
     /// Newest record, whether or not it is written; `None` without a record.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
-    /// Record of the last completed write, successful or not.
+    /// Record of the last write that has ended, successfully or not.
     tried: Option<Vec<u8>>,
     writes: u64,
     slowest: Span,
@@ -143,9 +143,9 @@ impl StoredFile {
         })
     }
 
-    /// Begins to write `record`, unless it is already written. Returns true once its write has succeeded or failed.
+    /// Begins to write `record`, unless this was already tried. Returns true once a write of it has succeeded or failed.
     ///
-    /// After a failure the program flies on: a drone in the air must not become silent because of a full disk.
+    /// After a failure the program continues: a drone in the air must not become silent because of a full disk.
     pub fn store(&mut self, record: &[u8]) -> bool {
         if self.record.as_deref() != Some(record) {
             self.record = Some(record.to_vec());
@@ -157,7 +157,9 @@ impl StoredFile {
         is_tried
     }
 
-    /// Handles the end of a write, and writes a newer record. Retries a failed write after a pause.
+    /// Handles the end of a write. Then begins to write the newest record, if it differs from the written one.
+    ///
+    /// Retries a failed write after a pause.
     ///
     /// Returns the time of the retry; `None` if no retry is needed.
     pub fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {

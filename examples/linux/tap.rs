@@ -17,12 +17,12 @@ use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, Interface};
 use crate::log::Log;
 use crate::replug::Replug;
 
-/// Maximum number of reads and writes that wait for the writer thread. More than these are not captured.
+/// Maximum number of captured reads and writes that wait for the writer thread. Further ones are not captured.
 const QUEUE: usize = 1_024;
 
 const MAX_CAPTURES: u32 = 9_999;
 
-/// Bytes received or sent by one call at the port with number `port`.
+/// Bytes that one call has received or sent at the port with number `port`.
 struct Piece {
     port: usize,
     at: Duration,
@@ -91,7 +91,7 @@ impl Tap {
         self.is_over
     }
 
-    /// Returns the error that ended the capture. One port alone returns it, and only once.
+    /// Returns the error that ended the capture. Only the first call returns it, though all ports share the capture.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let was_reported = self.state.is_reported.swap(true, Ordering::Relaxed);
@@ -109,12 +109,10 @@ impl Tap {
     }
 }
 
-/// Captures all further traffic of `ttys` in the file `asked`.
+/// Captures all further traffic of `ttys` in the file `asked`, or in a new file if `asked` exists.
 ///
-/// Logs the file's name if it differs from `asked`.
-///
-/// An earlier capture is never overwritten, because it may be the only record of a crash. If `asked` exists, a number
-/// is added to the name.
+/// An earlier capture is never overwritten, because it may be the only record of a crash. A new file has the name
+/// `asked` with a number added, and its name is logged.
 ///
 /// # Errors
 /// One line that names the file.
@@ -157,7 +155,9 @@ pub fn attach<'a>(
     Ok(())
 }
 
-/// Creates the capture file under the first free name. A device or FIFO is opened as it is.
+/// Creates the capture file under the first unused name: `path`, or `path` with a number added.
+///
+/// A device or FIFO is opened under its own name.
 fn create(path: &Path) -> Result<(File, PathBuf), String> {
     let named = |error: io::Error| format!("--capture {}: {error}", path.display());
     let is_other = path.metadata().is_ok_and(|it| !it.is_file());

@@ -16,7 +16,7 @@ use uav_relay::serial::{Fault, SerialPort};
 pub struct Tty {
     fd: OwnedFd,
     name: String,
-    /// True after a partial write, because the tty's buffer is full.
+    /// True if the tty accepted only a part of the last write, because its buffer is full.
     full: bool,
     failure: Option<String>,
 }
@@ -77,7 +77,7 @@ impl Tty {
             .get_or_insert_with(|| format!("{name}: {what}"));
     }
 
-    /// Returns the number of transferred bytes; `None` if the caller must repeat the call later.
+    /// Returns the number of transferred bytes; `None` if the caller must retry, as the tty was not ready.
     fn done(&mut self, result: Result<usize, Errno>) -> Result<Option<usize>, Fault> {
         match result {
             Ok(count) => Ok(Some(count)),

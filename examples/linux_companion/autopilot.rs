@@ -31,7 +31,7 @@ const WAITING: usize = 4_096;
 
 const EVENT: &str = "autopilot";
 
-/// Link number in this program's MAVLink signatures.
+/// Link ID of this program in its MAVLink signatures.
 const LINK: u8 = 0;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -63,7 +63,7 @@ pub(crate) struct AutopilotPlan {
     pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
-    /// Side to which the drone's directional antenna points; `None` without such an antenna.
+    /// Side of the chain to which the drone's directional antenna points; `None` without such an antenna.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
     /// Flight time with a full battery, s (NaN if unknown), return speed and descent speed, m/s.
@@ -229,7 +229,7 @@ impl Companion {
         std::mem::take(&mut self.cleared)
     }
 
-    /// Reports a drone that is far from the line Tx to Rx or outside its geofence, if a report is due.
+    /// Reports that the drone is outside its geofence, if such a report is due.
     ///
     /// Every report is logged, and some are also sent to the operator.
     fn check_fence(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
@@ -253,7 +253,7 @@ impl Companion {
         }
     }
 
-    /// Logs, once for each kind of received data, that no autopilot has been found since the start.
+    /// Logs that no autopilot has been found since the start, once for each kind of data received instead.
     fn log_unanswered(&mut self, now: Instant, log: &Log) {
         let received = self.received_kind();
         if let Some(missing) = self.answers.check(now, received) {
@@ -280,7 +280,9 @@ impl Companion {
         })
     }
 
-    /// Returns the log text about a missing autopilot, with hints for the operator.
+    /// Returns the log text about an autopilot that was not found, with hints for the operator.
+    ///
+    /// `answer` is the kind of data received instead.
     fn unanswered(&self, answer: Received) -> String {
         match (answer, &self.port) {
             (Received::Nothing, Port::Udp(datagrams)) => {
@@ -321,7 +323,7 @@ impl Companion {
         self.link.is_landed(now)
     }
 
-    /// Shows an event of the relay to the operator.
+    /// Passes an event of the relay to the autopilot link, which shows it to the operator.
     pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);
     }
@@ -510,7 +512,7 @@ const fn mistrusted(why: Mistrust) -> &'static str {
 
 /// Returns this machine's time as a timestamp of MAVLink signatures.
 ///
-/// If this clock is behind the autopilot's, the link continues from the autopilot's timestamps.
+/// If this machine's clock is behind that of the autopilot, the link continues from the autopilot's timestamps.
 pub(crate) fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());

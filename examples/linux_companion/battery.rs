@@ -16,15 +16,15 @@ use crate::autopilot::Companion;
 use crate::lost::log_command;
 use uav_relay_linux::log::Log;
 
-/// Time between two texts about the same refused departure.
+/// Time between two texts to the pilot about the same refused departure from the chain.
 const AGAIN: Duration = Duration::from_millis(60_000);
 
-/// Minimum time between two log lines about a pending departure.
+/// Minimum time between two log lines about a departure from the chain that is not granted yet.
 const LOGGED: Duration = Duration::from_millis(10_000);
 
 /// Maximum wait of a starting relay for its drone's endurance (remaining flight time).
 const FIRST: Duration = Duration::from_millis(10_000);
-/// Maximum wait of a starting relay, from the first low endurance to the confirmation of the departure.
+/// Maximum time from a starting relay's first low endurance to the confirmation of its departure.
 const CONFIRMED: Duration = Duration::from_millis(20_000);
 
 /// State of the relay's departure from the chain because of its battery, as last logged.
@@ -33,19 +33,19 @@ pub(crate) struct Battery {
     departure: Departure,
     logged_at: Instant,
     told_at: Instant,
-    /// True while the starting relay waits for its endurance.
+    /// True while the starting relay waits for its drone's endurance (remaining flight time).
     waits: bool,
-    /// Time of the first low endurance during the wait.
+    /// Time of the first endurance below the limit for leaving the chain, during the wait at the start.
     low_at: Option<Instant>,
     has_reserve: bool,
-    /// Last time at which the endurance was known or not needed.
+    /// Last time at which the drone's endurance (remaining flight time) was known, or not needed.
     ///
-    /// The endurance is not needed on the ground, nor after the relay was informed that it is unknown.
+    /// The endurance is not needed on the ground, nor after the relay was informed that the endurance is unknown.
     known_at: Instant,
 }
 
 impl Battery {
-    /// Creates the state at the start. With `has_reserve` the relay waits for its endurance.
+    /// Creates the state at the start. With `has_reserve` (option `--reserve`) the relay waits for its endurance.
     pub(crate) const fn new(has_reserve: bool) -> Self {
         Self {
             departure: Departure::Member,
@@ -58,7 +58,7 @@ impl Battery {
         }
     }
 
-    /// Returns true while a starting relay waits for its endurance.
+    /// Returns true while a starting relay waits for its drone's endurance (remaining flight time).
     ///
     /// A relay that restarts with a low battery thereby leaves the chain before it takes part in an agreement.
     pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
@@ -75,10 +75,10 @@ impl Battery {
         self.waits
     }
 
-    /// Informs the relay that its endurance is unknown, if none was received for 10 s.
+    /// Informs the relay that its drone's endurance is unknown, if no endurance was received for 10 s.
     ///
-    /// Does nothing while the autopilot is silent or the drone is on the ground. The relay reports the unknown
-    /// endurance by an event.
+    /// The relay then raises an event. This function does nothing while the autopilot is silent or the drone is on the
+    /// ground.
     pub(crate) fn tell_unknown(
         &mut self,
         now: Instant,
@@ -176,7 +176,7 @@ impl Battery {
         ))
     }
 
-    /// Returns the endurance and the departure as JSON; `null` is unknown.
+    /// Returns the drone's endurance and the relay's departure as JSON. An unknown value is `null`.
     pub(crate) fn status(&self, relay: &Relay, now: Instant) -> Value {
         json!({
             "departure": word(self.departure),
@@ -197,7 +197,7 @@ const fn is_pending(departure: Departure) -> bool {
     )
 }
 
-/// Returns the reason of a refused departure for the pilot, at most 37 bytes; otherwise `None`.
+/// Returns the pilot's text for the reason of a refused departure, at most 37 bytes; otherwise `None`.
 const fn refusal(departure: Departure) -> Option<&'static str> {
     Some(match departure {
         Departure::NeedsGuard => "refused: no guard",

@@ -56,7 +56,7 @@ impl Datagrams {
         })
     }
 
-    /// Reads one datagram; returns its length, or 0.
+    /// Reads one datagram; returns its length, or 0 if none was received.
     pub(crate) fn read(&mut self, into: &mut [u8]) -> usize {
         let count = self.call(|socket| socket.recv(into));
         self.read += count as u64;
@@ -90,7 +90,7 @@ impl Datagrams {
         self.read
     }
 
-    /// Returns a log text about an address that does not answer, with things to check.
+    /// Returns a log text about an autopilot's address that does not answer, with hints for the operator.
     pub(crate) fn silence(&self) -> String {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {
@@ -139,7 +139,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// Checks that after a refused datagram the next one is not lost, whether sent or received.
+    /// Checks that the datagram after a refused one is not lost, neither in sending nor in receiving.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

@@ -13,12 +13,12 @@ const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns the reasons why the drone waits for its neighbours: upstream, downstream.
+/// Returns the reasons why the drone waits for its upstream and for its downstream neighbour.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Logged reasons why the drone waits for its neighbours, and newer reasons that may not last.
+/// Reasons why the drone waits for its neighbours: those logged, and the newest ones (maybe brief).
 #[derive(Debug, Default)]
 pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],
@@ -27,7 +27,9 @@ pub(crate) struct HoldReasonLog {
 }
 
 impl HoldReasonLog {
-    /// Logs changed reasons. Returns the time of the next check, if any.
+    /// Logs the reasons for waiting if they have changed, once they have lasted for [`SETTLES`].
+    ///
+    /// Returns the time at which changed reasons will have lasted that long, if any.
     pub(crate) fn tend(
         &mut self,
         now: Instant,

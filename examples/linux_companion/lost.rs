@@ -14,7 +14,7 @@ use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// Relays that this relay has lost since its start and does not receive at present.
+/// Relays that were lost since this relay's start, and that this relay does not receive at present.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,
@@ -101,7 +101,7 @@ impl Lost {
         Ok(cleared(named, side))
     }
 
-    /// Forgets lost relays that have landed, as reported over MAVLink.
+    /// Removes the relays `named` from the lost ones: they have landed, as reported over MAVLink.
     pub(crate) fn remove_cleared(&mut self, named: &[u16]) {
         self.nodes.retain(|node| !named.contains(node));
     }
@@ -134,7 +134,7 @@ impl Lost {
 
 /// Logs an operator's command and its result; returns the answer.
 ///
-/// `done` has the name and the text of the logged event.
+/// `done` is the result: the name and the text of the event to log, or the text of a refusal.
 pub(crate) fn log_command(
     now: Instant,
     log: &Log,

@@ -19,8 +19,8 @@ const NEAR_M: f32 = 1.0;
 
 /// Time without a change of the setpoint after which a move has ended.
 ///
-/// A drone near its agreed position counts as arrived only after the same time, because it may fly past the position
-/// first.
+/// A drone counts as arrived only after it was near its agreed position for the same time, because it may first fly
+/// past the position.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -91,7 +91,7 @@ impl Movement {
         (step, end.into_iter().chain(near).min())
     }
 
-    /// Returns the setpoint as a line to log, if any.
+    /// Returns the setpoint if it must be logged now, otherwise `None`.
     fn next(
         &mut self,
         now: Instant,
@@ -126,7 +126,7 @@ impl Movement {
         self.near_since = None;
     }
 
-    /// Returns the drone's arrival at `goal`, if it must be logged.
+    /// Returns the drone's arrival at `goal` once it has stayed there for [`SETTLES`]; otherwise `None`.
     ///
     /// `goal` is the agreed position once the setpoint has reached it; before that it is `None`.
     fn arrival(
@@ -151,7 +151,7 @@ impl Movement {
 }
 
 impl Step {
-    /// Logs this setpoint or arrival. Each number of a setpoint is also logged as the bits of its f32.
+    /// Logs this setpoint or arrival. Each coordinate of a setpoint is also logged as the bits of an f32.
     ///
     /// The position is in the mission's coordinates. `x_m` is the distance from the transmitter toward the receiver,
     /// `y_m` the distance to the right when facing the receiver, `altitude_m` the height above the ground.

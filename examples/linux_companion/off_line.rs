@@ -17,7 +17,7 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// Tolerance of the geofence, m. Only drones farther outside are reported.
+/// Maximum distance outside the geofence, m, at which a drone is not reported yet.
 const FENCE_M: f64 = 100.0;
 
 /// Minimum ratio of two distances for the log to suggest swapped latitude and longitude.
@@ -61,7 +61,9 @@ impl OffLineMonitor {
         fresh.map(|(_, place)| place)
     }
 
-    /// Returns the report on the drone at `off_line`, far from the line Tx to Rx. `sites` are the Tx and Rx positions.
+    /// Returns the report on a drone far from the line Tx to Rx. `off_line` has its position and distance.
+    ///
+    /// `sites` are the Tx and Rx positions.
     pub(crate) fn line_report(&mut self, sites: Sites, off_line: OffLine) -> Option<OffLineReport> {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
@@ -108,9 +110,9 @@ impl OffLineMonitor {
         self.lines.as_ref()
     }
 
-    /// Returns the drone's distance from the line Tx to Rx as JSON, and the limit that it exceeds.
+    /// Returns the drone's distance from the line Tx to Rx, and the limit that the drone exceeds, as JSON.
     ///
-    /// The limit is `line`, `geofence` or `null`.
+    /// The limit is `line` or `geofence`, or `null` if the drone exceeds none.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from_line_m": self.away_m,
@@ -123,7 +125,7 @@ impl OffLineMonitor {
     }
 }
 
-/// Line from Tx to Rx, and the line with swapped latitude and longitude; `None` for an invalid one.
+/// Line from Tx to Rx, and the same line with latitude and longitude swapped (`None` if invalid).
 #[derive(Debug)]
 struct Lines {
     sites: Sites,

@@ -215,7 +215,9 @@ pub(crate) struct BatteryOptions {
 }
 
 impl BatteryOptions {
-    /// Returns the arguments of `Autopilot::set_endurance`; `None` if no battery message is needed.
+    /// Returns full flight time (s), return speed and descent speed (m/s) for `Autopilot::set_endurance`.
+    ///
+    /// `None` if no battery message is needed.
     fn endurance(&self) -> Option<[f32; 3]> {
         let full_s = self.flight_time.unwrap_or(f32::NAN);
         let is_needed = self.reserve.is_some() || self.flight_time.is_some();
@@ -226,7 +228,9 @@ impl BatteryOptions {
         self.reserve.map(micros)
     }
 
-    /// Checks that the flight time is known if needed, and longer than reserve plus time of replacement.
+    /// Checks the battery options. `--reserve` needs a source of the remaining flight time.
+    ///
+    /// `--flight-time` must be longer than the reserve plus the time for the relay's replacement.
     fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
         if let Some(reserve) = self.reserve.filter(|_| !has_source) {
             return Err(format!(
@@ -265,11 +269,11 @@ pub(crate) struct Plan {
     pub(crate) key: Option<SigningKey>,
     pub(crate) autopilot: Option<AutopilotPlan>,
     pub(crate) overrides: Vec<Override>,
-    /// Planned position of this relay, if the file has a plan.
+    /// Planned position of this relay, if the `--config` file has a plan of positions.
     pub(crate) planned: Option<Placement>,
 }
 
-/// Reads and checks the command line. The error is the exit status after help or a mistake.
+/// Reads and checks the command line. The error is the exit status after the help text or an error line.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     let (options, beyond) = command::read(section)?;
     plan(options, beyond).map_err(|line| command::refuse(&line))

@@ -10,7 +10,7 @@ use crate::options::Options;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 
-/// Serial port toward a neighbour; `None` at an end of the chain.
+/// Serial port toward one neighbour; `None` if the relay has no port in this direction.
 #[derive(Debug)]
 pub(crate) struct End(Option<Replug>);
 
@@ -54,7 +54,7 @@ impl Ports {
 
     /// Exchanges bytes between ports and relay. Returns the time by which the next call is due.
     ///
-    /// Changed votes are passed to `store` before the relay sends.
+    /// Changed votes on the chain's members are passed to `store` before the relay sends.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -77,7 +77,7 @@ impl Ports {
             .min()
     }
 
-    /// Discards received bytes, up to 16 KiB of each tty.
+    /// Reads and discards the bytes received so far, at most 16 KiB of each tty.
     pub(crate) fn discard(&mut self) {
         let mut bytes = [0; 1_024];
         for tty in self.ttys() {

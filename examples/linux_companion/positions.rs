@@ -36,10 +36,11 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position and the newest times since the last call; `None` for a missing value.
+    /// Returns the drone's newest position, and its newest times, since the last call; `None` if missing.
     ///
-    /// The times are the remaining flight time and the time to fly home, s; NaN if invalid. Passes measurements to
-    /// `on_sample`, and logs the first invalid line. Work: that of one call of [`Fifo::read`].
+    /// The times are the remaining flight time and the time to fly home, s; NaN if invalid. Measurements of
+    /// interference are passed to `on_sample`, and the first invalid line is logged. One call has the work of one
+    /// [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
@@ -97,9 +98,9 @@ impl Positions {
     }
 }
 
-/// Logs, for a relay without an autopilot, whether the guard keeps drones apart in flight.
+/// Logs, for a relay without an autopilot, if the guard (collision avoidance) is on.
 ///
-/// Without `positions` the guard is off.
+/// The guard keeps drones apart in flight. It is off without `positions`.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
@@ -121,9 +122,10 @@ enum Line {
     Endurance([f32; 2]),
 }
 
-/// Parses a line: position with or without power, `receiver` and power, or `endurance` and two times.
+/// Parses a line with a position, a measured interference power, or times of flight.
 ///
-/// Returns the reason as an error if the line is invalid, or has a power although `listens` is false.
+/// The forms are `X Y ALTITUDE [POWER]`, `receiver POWER` and `endurance SECONDS HOME`. Returns the reason as an error
+/// if the line is invalid, or has a power although `listens` is false.
 fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
     let words = lines::words(text)?;
     let number = |word: &str| {

@@ -16,11 +16,13 @@ use crate::relay::Refusal;
 const VIEWS: &str = "--view-file";
 const UPLOADS: &str = "--upload-file";
 
-/// Restores the votes of an earlier start into `relay`. Returns the file of the votes, and true if the file had votes.
+/// Restores into `relay` the votes on the chain's members that an earlier start of the program stored.
+///
+/// Returns the file of the votes, and true if the file had votes.
 ///
 /// # Errors
-/// One line with the file, the fault and the remedy: a relay that has lost its votes must not vote again in the same
-/// flight.
+/// One line with the file, the fault and the remedy. The reason for the error is that a relay that has lost its votes
+/// must not vote again in the same flight.
 pub(crate) fn resume_views(
     file: &Path,
     relay: &mut Relay,
@@ -47,7 +49,7 @@ pub(crate) fn resume_views(
     Ok((StoredFile::new(VIEWS, file, stored)?, stored.is_some()))
 }
 
-/// Restores an uploaded mission of an earlier start into `relay`; returns true if there was one.
+/// Restores into `relay` the mission that was uploaded before this start; returns true if there was one.
 ///
 /// `mission` is the mission of the relay's options, on which the upload is based.
 ///
@@ -72,7 +74,7 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
     })
 }
 
-/// Reads an uploaded mission of an earlier start, if any.
+/// Reads from `file` the mission that was uploaded before this start, if any.
 ///
 /// # Errors
 /// A line that names the file and the fault.
@@ -92,7 +94,7 @@ pub(crate) fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Uploa
     Ok(Some(upload))
 }
 
-/// Starts the thread that writes uploaded missions to `file`, once [`store_upload`] is called.
+/// Starts the writer thread of `file`, which stores the uploaded missions passed to [`store_upload`].
 pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
     StoredFile::new(UPLOADS, file, None)
 }

@@ -21,7 +21,7 @@ use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::{StoredFile, next_epoch};
 use uav_relay_linux::{config, tap};
 
-/// Time between two checks while the relay waits for its drone's endurance.
+/// Time between two checks while the relay waits for its drone's endurance (remaining flight time).
 const WAIT: Duration = Duration::from_millis(100);
 
 struct Flight {
@@ -31,7 +31,7 @@ struct Flight {
     ports: Ports,
     positions: Option<Positions>,
     autopilot: Option<Companion>,
-    /// File with the relay's votes.
+    /// File with the relay's votes on the chain's members.
     views: Option<StoredFile>,
     /// File with the newest uploaded mission.
     uploads: Option<StoredFile>,
@@ -45,7 +45,7 @@ struct Flight {
 #[derive(Debug)]
 pub(crate) struct Refusal {
     pub(crate) line: String,
-    /// True if a restart of the program would fail as well, until configuration or hardware is changed.
+    /// True if a restart of the program would fail, too, until the configuration or hardware is changed.
     ///
     /// False for a missing port, which may come back by itself.
     pub(crate) is_final: bool,
@@ -298,7 +298,7 @@ impl Flight {
     }
 }
 
-/// Returns the key with a new epoch for this start; `None` without a key.
+/// Returns the signing key with a new epoch (start counter) for this start; `None` without a key.
 ///
 /// The epoch is stored and never reused.
 pub(crate) fn auth(plan: &Plan) -> Result<Option<Auth>, String> {

@@ -39,7 +39,7 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Creates the report. `flies` is true if this program sends setpoints to an autopilot.
+    /// Creates the writer of the relay's log lines. `flies` is true if this program sends setpoints to an autopilot.
     pub(crate) fn new(
         log: Log,
         identity: Identity,
@@ -91,7 +91,7 @@ impl Report {
         }
     }
 
-    /// Logs that the relay flies an uploaded mission of an earlier start.
+    /// Logs that the relay flies a mission that was uploaded to it before this start.
     pub(crate) fn resumed(&self, relay: &Relay) {
         let version = relay.version();
         self.log.event(
@@ -102,7 +102,7 @@ impl Report {
         );
     }
 
-    /// Logs that the relay's votes were restored from an earlier start.
+    /// Logs that the relay's votes on the chain's members were restored from an earlier start.
     pub(crate) fn votes_restored(&self) {
         self.log.line(
             Instant::ZERO,
@@ -174,7 +174,7 @@ impl Report {
         }
     }
 
-    /// Logs a new setpoint or the drone's arrival, if due. Returns the time of the next check.
+    /// Logs a new setpoint or the drone's arrival, if there is one to log. Returns the time of the next check.
     ///
     /// `drone` is the drone's position.
     pub(crate) fn log_movement(
@@ -190,7 +190,7 @@ impl Report {
         again
     }
 
-    /// Logs a rejected upload. If the upload violates the geofence, the line states the permitted range.
+    /// Logs a rejected upload. If the upload violates the geofence, the log line has the permitted range.
     fn refused(&self, now: Instant, why: LineError) {
         const EVENT: &str = "upload refused";
         let range_m = match (why, self.fence) {
@@ -296,14 +296,14 @@ impl Report {
         );
     }
 
-    /// Returns the relay's own number, which never changes.
+    /// Returns the number of this relay, which never changes.
     pub(crate) const fn index(&self) -> u16 {
         self.identity.index
     }
 
-    /// Returns the name of a node for the log.
+    /// Returns the name of a node (Tx, relay or Rx) for the log.
     ///
-    /// `node` is its number at the start: 0 is the transmitter, N + 1 the receiver.
+    /// `node` is the node's number at the start: 0 is the transmitter; in a mission of N relays, N + 1 is the receiver.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
             0 => "the transmitter".to_owned(),
@@ -320,7 +320,7 @@ impl Report {
         }
     }
 
-    /// Logs that the chain flies a new mission, and its Tx and Rx positions, if any.
+    /// Logs that the chain flies a new mission, with the Tx and Rx positions of this mission, if any.
     fn adopted(&self, now: Instant, relay: &Relay) {
         let version = relay.version();
         let fields = json!({ "version": version });
@@ -357,7 +357,9 @@ impl Report {
         }
     }
 
-    /// Logs the begin and end of the relay's fitted time slots, as fractions of the frame.
+    /// Logs begin and end of the time slots in which this relay sends and receives, fitted to its hops.
+    ///
+    /// The values are fractions of the frame, which is the period of all slots.
     fn log_slots(&self, now: Instant, slots: SlotShares) {
         let said = |name: &str, [begin, end]: [f32; 2]| {
             format!("{name} {:.6} to {:.6}", Exact(begin), Exact(end))
@@ -409,7 +411,7 @@ impl Report {
     }
 }
 
-/// Returns the direction toward `side`, for the log.
+/// Returns the words of the log for the direction toward `side`, such as `upstream (toward Tx)`.
 pub(crate) const fn direction(side: Side) -> &'static str {
     match side {
         Side::Upstream => "upstream (toward Tx)",

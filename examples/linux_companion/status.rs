@@ -11,7 +11,9 @@ pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
 }
 
-/// Returns the begin and end of the relay's fitted slots as JSON, as fractions of the frame.
+/// Returns begin and end of the relay's fitted time slots as JSON.
+///
+/// The values are fractions of the frame, which is the period of all slots.
 pub(crate) fn slots(of: SlotShares) -> Value {
     json!({
         "from_tx": of.from_tx, "to_rx": of.to_rx, "from_rx": of.from_rx, "to_tx": of.to_tx,

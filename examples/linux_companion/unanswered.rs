@@ -20,7 +20,9 @@ pub(crate) enum Received {
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Kind of the received data, and the time of its first reception; `None` once the autopilot is found.
+    /// Newest kind of received data, and the time of its first reception.
+    ///
+    /// `None` once the autopilot is found.
     newest: Option<(Received, Instant)>,
     reported: Option<Received>,
 }
@@ -33,7 +35,7 @@ impl AnswerMonitor {
         }
     }
 
-    /// Handles the received kind of data. Returns the kind of fault to report; each kind is returned once.
+    /// Records the kind of data received. Returns the kind if it must now be reported as a fault, once for each kind.
     ///
     /// `received` is `None` once the autopilot is found.
     pub(crate) fn check(&mut self, now: Instant, received: Option<Received>) -> Option<Received> {
@@ -53,7 +55,7 @@ impl AnswerMonitor {
         self.reported
     }
 
-    /// Returns the reported kind of fault, if any, until the autopilot is found.
+    /// Returns the reported kind of fault, if any; `None` once the autopilot is found.
     pub(crate) fn missing(&self) -> Option<Received> {
         self.newest.and(self.reported)
     }

@@ -8,11 +8,12 @@ use uav_relay_linux::log::Log;
 use crate::options::Plan;
 use crate::uploading::{Fault, Outcome};
 
-/// Age from which a relay's report counts as too old.
+/// Age from which the last report of a relay counts as too old.
 const OLD: Duration = Duration::from_millis(10_000);
 
-/// Time for which all relays must stay green. Only every eighth report of a relay has its neighbours and its version,
-/// so a shorter time could miss a fault.
+/// Time for which all relays must stay green (without a fault) before the check ends with success.
+///
+/// Only every eighth report of a relay has its neighbours and its version, so a shorter time could miss a fault.
 const GREEN_FOR: Duration = Duration::from_millis(2_000);
 
 /// Running check of a chain before flight.
@@ -34,8 +35,9 @@ impl Check {
         }
     }
 
-    /// Logs the table of the relays and returns the result at the end of the check. The check ends when all relays are
-    /// green, or when its time is over. `None` before the end.
+    /// Logs the table of the relays, and returns the result at the end of the check; `None` before the end.
+    ///
+    /// The check ends when all relays have stayed green (without a fault), or when its time is over.
     pub(crate) fn turn(
         &mut self,
         now: Instant,

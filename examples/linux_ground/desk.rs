@@ -36,11 +36,12 @@ use crate::uploading::{Form, Preview, Uploading, digest_of};
 /// Maximum distance of a drone from its agreed position, m, for the drone to count as arrived.
 const ARRIVED_M: f32 = 1.0;
 
-/// Maximum age of the data shown on the page when it requests an upload, s. A request with older data is refused, for
-/// example if it was delayed on the way.
+/// Maximum age of the page's data, s, with which the page may request an upload.
+///
+/// A request with older data is refused, for example a request that was delayed on the way.
 const OLDEST_S: f64 = 5.0;
 
-/// Largest number of characters of a task's answer in the log.
+/// Maximum number of characters that the log has of the answer to a task of the page or status socket.
 const LOGGED: usize = 300;
 
 /// Time after a refused task is logged in which further refused tasks are not logged.
@@ -49,13 +50,13 @@ const QUIET: Duration = Duration::from_millis(1_000);
 /// Largest number of the page's tasks that one call handles.
 const AT_ONCE: usize = 4;
 
-/// Values of a preview, parsed as on the command line.
+/// Values entered for the preview of a new mission, parsed as on the command line.
 #[derive(Parser, Debug)]
 #[command(no_binary_name = true, disable_help_flag = true)]
 struct Words {
     #[command(flatten)]
     new: NewOptions,
-    /// Needed by the other options; the version follows from the flown mission.
+    /// Placeholder, because the other options need a version. The real version follows from the flown mission.
     #[arg(long)]
     version: Option<u16>,
     #[arg(long, allow_hyphen_values = true, value_parser = site)]
@@ -68,25 +69,25 @@ struct Words {
 struct Confirmed {
     preview: u32,
     digest: String,
-    /// Time of the newest data that the page showed at the request, s since the start of the station.
+    /// Time of the newest data that the page showed at the request, s since the start of this program.
     time_s: f64,
 }
 
-/// Body of a request that clears a lost relay.
+/// Body of the page's request to remove a lost relay from the page.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Cleared {
     relay: u16,
-    /// Time of the newest snapshot that the page had, s.
+    /// Time of the newest data that the page showed at the request, s since the start of this program.
     time_s: f64,
 }
 
 /// Tasks of the page and of the status socket.
 #[derive(Debug)]
 pub(crate) struct Desk {
-    /// Tasks that the page gives to the program; `None` without a page.
+    /// Tasks that the page has sent to this program; `None` without a page.
     posts: Option<Receiver<Post>>,
-    /// Number of previews so far.
+    /// Number of upload previews so far.
     previews: u32,
     /// Time from which on a refused task is logged.
     logs_at: Instant,
@@ -227,8 +228,10 @@ impl Desk {
     }
 }
 
-/// Reads the values of preview `number` from `body`, a JSON object of strings. If `sited` is given, the receiver's new
-/// position may be given as latitude and longitude.
+/// Reads the values of preview `number` from `body`, a JSON object of strings.
+///
+/// `sited` are the mission's Tx and Rx positions on earth. Only with them the receiver's new position may be given as
+/// latitude and longitude.
 fn form(number: u32, sited: Option<Sites>, body: &str) -> Result<Form, String> {
     let mut given: BTreeMap<String, String> = serde_json::from_str(body).map_err(|error| {
         format!("the request must be a JSON object whose values are strings: {error}")
@@ -275,7 +278,7 @@ fn place(text: &str) -> Result<[f32; 2], String> {
     }
 }
 
-/// Checks that a request with the page's time `time_s` was not held on the way.
+/// Checks that the page's data were recent at its request. `time_s` is the time of these data, s.
 fn check_age(now: Instant, time_s: f64) -> Result<(), String> {
     let age_s = now.as_micros() as f64 / 1e6 - time_s;
     if (-1.0..=OLDEST_S).contains(&age_s) {
@@ -286,7 +289,7 @@ fn check_age(now: Instant, time_s: f64) -> Result<(), String> {
     ))
 }
 
-/// Clears a lost relay on the page.
+/// Removes a lost relay from the page, as the page has requested with `body`.
 fn clear(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, String> {
     let asked: Cleared = serde_json::from_str(body).map_err(|error| error.to_string())?;
     check_age(now, asked.time_s)?;
@@ -388,8 +391,9 @@ pub(crate) fn preview(plan: &Plan, preview: &Preview) -> Value {
     })
 }
 
-/// Returns the SIRs of the worst hop toward Rx and of the worst hop toward Tx, dB. The relays are at the positions
-/// `places`. An SIR is `None` if it is unknown.
+/// Returns the SIR of the worst hop toward Rx, and that of the worst hop toward Tx, dB.
+///
+/// `places` are the positions of the relays. `None` stands for an unknown SIR.
 fn worst_db(plan: &Plan, basis: &Basis, places: &[Placement]) -> [Option<f64>; 2] {
     let Ok(mission) = Mission::try_new(basis.config) else {
         return [None; 2];
@@ -501,8 +505,9 @@ mod tests {
         new.upload(version, loaded, sited, before).ok()
     }
 
-    /// Returns the final setpoints of a simulated chain that flies these uploads one after the other. The relays have
-    /// neither drones nor a geofence.
+    /// Returns the final setpoints of a simulated chain that flies `uploads` one after the other.
+    ///
+    /// The simulated relays have neither drones nor a geofence.
     fn flown(loaded: &Mission, method: Method, uploads: &[Upload]) -> Option<Vec<Placement>> {
         let mut setup = Setup::new(*loaded);
         setup.auth = true;
@@ -519,8 +524,9 @@ mod tests {
         ends.collect::<Option<Vec<_>>>().filter(|_| is_settled)
     }
 
-    /// Returns the limit because of which a relay with a drone refuses the upload `new`. `None` if the relay accepts.
-    /// The relay flies the mission `before`.
+    /// Returns the name of the limit that makes a relay with a drone refuse the upload `new`.
+    ///
+    /// `None` if the relay accepts the upload. The relay flies the mission `before` at that time.
     fn limit(loaded: &Mission, before: Option<&Upload>, new: &Upload) -> Option<&'static str> {
         let settings = Settings {
             guard: Some(GuardConfig::of(loaded, loaded.config().common)),

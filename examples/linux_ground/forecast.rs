@@ -101,8 +101,9 @@ impl Chain {
         }
     }
 
-    /// Runs the chain until all relays have agreed on positions in mission `version`. Returns these positions, or
-    /// `None` if the time `end` comes first.
+    /// Runs the chain until all relays have agreed on positions in mission `version`.
+    ///
+    /// Returns these positions; `None` if the relays have not agreed by the time `end`.
     fn positions(&mut self, version: u16, end: Clock) -> Option<Vec<Placement>> {
         self.agreed.fill(false);
         while !self.agreed.iter().all(|agreed| *agreed) {

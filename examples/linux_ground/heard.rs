@@ -7,7 +7,9 @@ use uav_relay_linux::log::Log;
 
 use crate::report;
 
-/// Time without an answer after which a relay counts as lost. In this time a lost handshake can be repeated.
+/// Time without an answer after which a relay counts as lost.
+///
+/// It is long enough for a second handshake if the first one was lost.
 const LOST_AFTER: Duration = Duration::from_millis(5_000);
 
 /// State of a nearby relay that has answered this station at least once.
@@ -22,8 +24,9 @@ enum State {
 pub(crate) struct NearbyRelays(BTreeMap<u16, State>);
 
 impl NearbyRelays {
-    /// Updates and logs which nearby relays answer this station. Returns the time of the next check; `None` if no relay
-    /// is silent.
+    /// Records which nearby relays answer this station, and logs changes.
+    ///
+    /// Returns the time at which a silent relay will count as lost; `None` if no relay is silent.
     pub(crate) fn update(&mut self, now: Instant, ground: &Ground, log: &Log) -> Option<Instant> {
         for (node, answers) in ground.relays_in_reach() {
             let before = self.0.get(&node).copied();

@@ -25,7 +25,7 @@ const TAIL: u64 = 1_024;
 /// Minimum time between two measurements sent to the relays, so that they do not fill the channel.
 const EVERY: Duration = Duration::from_millis(500);
 
-/// Time without a measurement after which the log reports that they are missing.
+/// Time without a measurement after which the log reports that measurements are missing.
 const SILENCE: Duration = Duration::from_millis(60_000);
 
 #[derive(Debug)]
@@ -52,7 +52,7 @@ pub(crate) struct Measurements {
     /// Newest measured power that has not been sent to the relays yet, W.
     newest_w: Option<f32>,
     next_at: Instant,
-    /// Time of the last valid line; `None` before the first.
+    /// Time of the last valid line; `None` before the first valid line.
     last_at: Option<Instant>,
     is_silent: bool,
     last_w: Option<f32>,
@@ -91,8 +91,10 @@ impl Measurements {
         })
     }
 
-    /// Returns the newest measured power, W. `None` if there is no new one, or the last one was sent less than 0.5 s
-    /// ago. Work: at most 64 KiB of lines.
+    /// Returns the newest measured power, W, if it was not returned before.
+    ///
+    /// `None` if there is no new measurement, or if the last one was returned less than 0.5 s ago. One call reads at
+    /// most 64 KiB of lines.
     pub(crate) fn newest(&mut self, now: Instant, log: &Log) -> Option<f32> {
         self.read(now, log);
         let silent_at = self.last_at.map(|at| at + SILENCE);
@@ -250,8 +252,10 @@ pub(crate) const fn name(end: Side) -> &'static str {
     }
 }
 
-/// Parses a measured power in W or dBm, and returns it in W. The word `transmitter` or `receiver` before it is
-/// permitted if it names this `end`. Returns the reason as an error if the line is invalid.
+/// Parses a measured power in W or dBm, and returns it in W.
+///
+/// The word `transmitter` or `receiver` may precede the power, if it names this station's `end` of the chain. The error
+/// is the reason why the line is invalid.
 fn level(text: &[u8], end: Side) -> Result<f32, String> {
     let words = lines::words(text)?;
     match words.as_slice() {

@@ -62,12 +62,14 @@ pub(crate) struct NewOptions {
     new_min_separation: Option<f32>,
 }
 
-/// Minimum distance of two relays along the line Tx to Rx for a certain order, m. It is twice the companion's default
-/// position error.
+/// Minimum distance of two relays along the line Tx to Rx at which their order is certain, m.
+///
+/// It is twice the companion's default position error.
 const ORDER_M: f32 = 2.0;
 
-/// Maximum distance of a new line Tx-Rx from the present line, m, beyond the length of the new line. A new line farther
-/// away is rejected, because the drones' positions could not be converted to its coordinates.
+/// Permitted distance of a new line Tx-Rx from the present line, m, beyond the new line's length.
+///
+/// A new line farther away is rejected, because the drones' positions could not be converted to its coordinates.
 const FAR_M: f64 = 100_000.0;
 
 /// Mission whose values are kept unless a `--new-` option changes them.
@@ -80,8 +82,9 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Returns the mission loaded before flight as the basis of a new mission. `sited` are its Tx and Rx positions;
-    /// `None` if they were not given.
+    /// Returns the mission loaded before flight as the basis of a new mission.
+    ///
+    /// `sited` are the Tx and Rx positions of the loaded mission; `None` if they were not given.
     pub(crate) const fn loaded(loaded: &Mission, sited: Option<Sites>) -> Self {
         Self {
             config: *loaded.config(),
@@ -279,8 +282,8 @@ fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String
 /// Returns the maximum angle, degrees, by which a new mission may turn the line Tx to Rx. Up to this angle the relays'
 /// order along the line stays the same, with position errors of up to 1 m.
 ///
-/// With the minimum separation s and the width w of the lateral range, the turn t solves s cos t - w sin t = a. Here a
-/// is the smaller of `ORDER_M`, two metres, and s / 2.
+/// The maximum angle t solves s cos t - w sin t = a. Here s is the minimum separation, w the width of the lateral
+/// range, and a the smaller of `ORDER_M` and s / 2.
 fn most_turn_deg(config: &MissionConfig) -> f32 {
     let (separation_m, width_m) = (
         config.min_separation_m,

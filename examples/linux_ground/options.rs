@@ -162,7 +162,7 @@ impl Plan {
     }
 }
 
-/// Reads and checks the command line. The error is the exit status after help or a mistake was printed.
+/// Reads and checks the command line. The error is the exit status after the help text or an error line.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     if std::env::args_os()
         .next_back()

@@ -90,7 +90,7 @@ pub(crate) fn outdated(version: u16, held: u16) -> String {
     }
 }
 
-/// Logs the mission version that a relay flies or has stored, as this relay reported it.
+/// Logs the mission version that a relay reports: the relay flies it, or has stored it to fly it later.
 pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     let FlownMission {
         by, version, flies, ..
@@ -131,8 +131,9 @@ pub(crate) struct FenceViolation {
 }
 
 impl FenceViolation {
-    /// Returns the first value of `upload` that exceeds the geofence; `None` if no value does. The relays are assumed
-    /// to have the default geofence, computed from the loaded mission.
+    /// Returns the first value of `upload` that exceeds the relays' geofence; `None` if no value does.
+    ///
+    /// The relays' geofence is taken to be the default one, which is computed from the loaded mission.
     pub(crate) fn of(loaded: &Mission, upload: &Upload) -> Option<Self> {
         let (loaded, new) = (loaded.config(), upload.config());
         let fence = |config: &MissionConfig| {
@@ -192,8 +193,8 @@ impl FenceViolation {
 
     /// Returns a text with the value, its permitted range, and the relay that would fly farthest outside.
     ///
-    /// If none would fly outside, as with a receiver beyond the limit, the text has the relay nearest to the limit. With
-    /// unknown moves it has neither.
+    /// If no relay would fly outside (for example, only the receiver is outside), the text has the relay nearest to the
+    /// limit. Without `moves` the text names no relay.
     pub(crate) fn line(&self, moves: Option<&[Move]>) -> String {
         let Self { what, name, .. } = self;
         let [least, most] = self.range_m;

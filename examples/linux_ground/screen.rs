@@ -27,17 +27,22 @@ const ASK_AGAIN: Duration = Duration::from_millis(10_000);
 pub(crate) struct Web {
     screen: Screen,
     view: StationView,
-    /// Uploaded mission that the chain flies; `None` if it flies the loaded mission, or an unknown one.
+    /// Uploaded mission that the chain flies. `None` if the chain flies the mission loaded before flight.
+    ///
+    /// It is also `None` if the values of the flown mission are unknown.
     flown: Option<Upload>,
-    /// Elevation model of the ground below the chain. `None` if the configuration file has none that can be read.
+    /// Elevation model of the ground below the chain. `None` if the configuration file names none.
+    ///
+    /// It is also `None` if the elevation model cannot be read.
     elevation: Option<Elevation>,
     next_at: Instant,
     ask_at: Instant,
 }
 
 impl Web {
-    /// Starts the server of the page, logs its address, and requests the relays' reports. Also returns the receiver of
-    /// the page's tasks (previews and uploads).
+    /// Starts the server of the page, logs its address, and requests the relays' reports.
+    ///
+    /// Returns the page, and the channel from which the page's tasks (previews and uploads) are received.
     ///
     /// # Errors
     /// One line that names the option, its value and the fault.
@@ -78,7 +83,7 @@ impl Web {
         Ok((web, posts))
     }
 
-    /// Clears a lost relay: the page no longer has it, until it reports again.
+    /// Removes a lost relay from the page, until the relay reports again.
     ///
     /// # Errors
     /// The reason if the relay is not lost.
@@ -91,8 +96,9 @@ impl Web {
         self.view.clear(now, relay, ground.reports())
     }
 
-    /// Shows a snapshot if it is time for the next one. Returns the time of the next snapshot. The function does not
-    /// wait for a browser.
+    /// Shows a new snapshot on the page if one is due, without waiting for a browser.
+    ///
+    /// Returns the time of the next snapshot.
     pub(crate) fn turn(
         &mut self,
         now: Instant,

@@ -33,7 +33,7 @@ struct Station<'a> {
     service: Service,
     ground: Ground,
     tty: Replug,
-    /// Bytes of the present frame that the tty has not accepted yet.
+    /// Bytes of the frame being sent that the tty has not accepted yet.
     outgoing: Vec<u8>,
     measurements: Option<Measurements>,
     hearing: NearbyRelays,
@@ -207,7 +207,7 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Continues the upload. Returns its result if the program must end with this result, otherwise `None`.
+    /// Continues the upload. Returns the result of the upload if the program must end with it; otherwise `None`.
     fn uploading(&mut self, time: Instant) -> Outcome {
         let Self {
             plan,
@@ -306,8 +306,9 @@ impl<'a> Station<'a> {
     }
 }
 
-/// Reads the operator's answer from standard input. Called only if input is available. The text is empty at the end of
-/// the input.
+/// Reads the operator's answer from standard input. The text is empty if standard input has ended.
+///
+/// Called only if input is available.
 fn answered() -> String {
     let mut line = String::new();
     match std::io::stdin().read_line(&mut line) {

@@ -10,7 +10,7 @@ use uav_relay_terrain::profile::Ground;
 /// Number of parts into which a terrain profile is divided. Each part has the height of its highest ground.
 const PARTS: u16 = 240;
 
-/// Elevation model of the configuration file, and the profile of the line that is flown.
+/// Elevation model of the configuration file, and the terrain profile below the chain's line Tx to Rx.
 pub(crate) struct Elevation {
     terrain: Terrain,
     mast_m: f64,
@@ -33,11 +33,13 @@ impl Elevation {
         })
     }
 
-    /// Returns the terrain profile below a line. `None` if the profile of this line has failed before.
+    /// Returns the terrain profile below the line Tx to Rx given by `line`.
+    ///
+    /// `None` if an earlier call for the same line has returned an error.
     ///
     /// # Errors
-    /// One line with the reason, for example that the elevation files do not cover the line. Reported once for each
-    /// line.
+    /// One line with the reason, for example that the elevation files do not cover the line. Only the first call for a
+    /// line returns it.
     pub(crate) fn along(&mut self, line: Sites) -> Result<Option<GroundProfile>, String> {
         if self.line != Some(line) {
             (self.line, self.profile) = (Some(line), None);

@@ -16,7 +16,9 @@ use uav_relay_screen::Tiles;
 /// Maximum size of a map picture or of a directory of the archive, bytes.
 const MOST: usize = 4 * 1024 * 1024;
 
-/// Archive file, read with ordinary reads. A memory map would end this program if another program truncated the file.
+/// Archive file, which is read but not mapped into memory.
+///
+/// A memory map would end this program if another program truncated the file.
 struct Archive(File);
 
 impl Archive {

@@ -27,13 +27,13 @@ use crate::options::Plan;
 use crate::report::{self, FenceViolation};
 use crate::{change, desk};
 
-/// Maximum time that a relay may take to send the values of its mission, after it has sent the version.
+/// Maximum time from a relay's report of the mission version to its report of the mission's values.
 const VALUES_TIMEOUT: Duration = Duration::from_millis(5_000);
 
-/// Maximum time until the chain answers a request of the page.
+/// Maximum time until the chain answers a request that came from the page.
 const PAGE_TIMEOUT: Duration = Duration::from_millis(15_000);
 
-/// Time between two checks whether a forecast is computed.
+/// Interval at which the station checks if the forecast of the relays' moves is computed.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
 #[derive(Debug)]
@@ -53,8 +53,9 @@ pub(crate) type Outcome = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// The station waits until a relay reports the mission that it flies, with its values. `Some` is the time at which
-    /// a relay first reported only the mission's version.
+    /// The station waits until a relay reports the mission that it flies, with its values.
+    ///
+    /// The field is the time at which a relay first reported the mission's version without its values; `None` before.
     Querying(Option<Instant>),
     /// A thread computes the relays' new positions. The field is the time at which the station next checks whether the
     /// thread has finished.
@@ -97,7 +98,7 @@ pub(crate) struct Uploading {
     stage: Stage,
     /// Mission to upload; `None` until a relay has reported the mission whose values it changes.
     upload: Option<Upload>,
-    /// Version and values of the mission that the chain flew when the preview was computed.
+    /// Version and upload of the mission that the chain flew when the preview was computed.
     based_on: (u16, Option<Upload>),
     forecast: Option<Receiver<Option<Vec<Move>>>>,
     preview: Option<Preview>,
@@ -115,8 +116,8 @@ pub(crate) struct Uploading {
 impl Uploading {
     /// Starts an upload by asking the chain for the mission that it flies.
     ///
-    /// `version` is the version on the command line; `None` for an upload of the page. The page's values are in `form`,
-    /// and get the next version.
+    /// `version` is the version given on the command line; `None` for an upload requested on the page. `form` has the
+    /// values entered on the page; their mission gets the next version.
     pub(crate) fn begin(
         now: Instant,
         plan: &Plan,
@@ -156,8 +157,9 @@ impl Uploading {
         self.is_confirming() && self.form.is_none()
     }
 
-    /// Returns true if another upload may replace this upload. This one has then ended, or it is a preview that the
-    /// page has not confirmed.
+    /// Returns true if another upload may replace this upload.
+    ///
+    /// This is possible if this upload has ended, or is a preview that the operator has not confirmed on the page.
     pub(crate) const fn is_idle(&self) -> bool {
         self.has_ended() || self.is_confirming() && self.form.is_some()
     }
@@ -259,7 +261,9 @@ impl Uploading {
         matches!(self.stage, Stage::Ended)
     }
 
-    /// Handles the operator's answer to the request for confirmation. `line` is empty at the end of standard input.
+    /// Handles the operator's answer `line` to the request for confirmation.
+    ///
+    /// The answer is empty if standard input has ended.
     pub(crate) fn answer(
         &mut self,
         now: Instant,
@@ -349,7 +353,7 @@ impl Uploading {
         })
     }
 
-    /// Builds the upload from the mission that the relays fly, and starts to compute the moves.
+    /// Builds the upload from the mission `flown` by the relays, and starts to compute the relays' moves.
     ///
     /// If the operator has already confirmed the upload on the page, the function starts the upload instead.
     fn decide(
@@ -427,7 +431,7 @@ impl Uploading {
         None
     }
 
-    /// Shows the moves once they are computed. Then starts the upload, or asks the operator for confirmation.
+    /// Shows the relays' moves once they are computed. Then starts the upload, or asks the operator to confirm it.
     fn await_moves(
         &mut self,
         now: Instant,
@@ -532,7 +536,9 @@ impl Uploading {
     }
 }
 
-/// Returns a mission's version and the digest of its upload as text. The page sends this text back with its requests.
+/// Returns a name of a mission for the page: its version, and the digest of its upload, if it was uploaded.
+///
+/// The page sends this name back with its requests.
 pub(crate) fn name_of(version: u16, upload: Option<&Upload>) -> String {
     upload.map_or_else(
         || version.to_string(),

@@ -34,7 +34,7 @@ const POSITION_ERROR_M: f32 = 1.5;
 /// Length of the longest frame to send, bytes.
 const LONGEST: usize = Link::LONGEST_FRAME;
 
-/// Pause before the next attempt to write to a full port. In this time the UART sends 115 bytes.
+/// Pause before the next attempt to write to a port whose send queue is full. In this time the UART sends 115 bytes.
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
@@ -51,7 +51,7 @@ pub(crate) struct Autopilot {
 }
 
 impl Autopilot {
-    /// Returns the guard settings `of`, changed to this drone's position error and stopping time.
+    /// Returns the guard's settings `of`, with the position error and the stopping time of this drone.
     #[expect(
         clippy::unnecessary_wraps,
         reason = "an image that does not fly has none"
@@ -64,9 +64,9 @@ impl Autopilot {
         })
     }
 
-    /// Creates the autopilot link in static RAM, for the line between `sites`.
+    /// Creates the autopilot link in static RAM, for the line from Tx to Rx in `sites`.
     ///
-    /// `None` if the mission's distance differs from the line's length.
+    /// `None` if the mission's distance differs from the length of this line.
     #[inline(never)] // frees its stack frame
     pub(crate) fn begin(
         uart: Uart,
@@ -82,7 +82,7 @@ impl Autopilot {
 
     /// Creates the autopilot link for a course: a line on earth and a speed limit.
     ///
-    /// The caller computes the course, to save stack here.
+    /// The caller computes the course, so that this function needs less stack.
     #[inline(never)]
     fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;
@@ -166,11 +166,12 @@ fn open(uart: Uart) -> Option<Port> {
     ))
 }
 
-/// Error: the block has an autopilot key, but this image cannot sign.
+/// Error: the configuration block has a key for the autopilot, but this image cannot sign frames.
 struct CannotSign;
 
-/// Enables signing to the autopilot if the block has a key. The board has no clock, so received timestamps give the
-/// time.
+/// Enables signed frames to the autopilot, if the configuration block has a key for it.
+///
+/// The board has no clock, so timestamps received from the autopilot give the time.
 #[cfg(feature = "mavlink-signing")]
 #[expect(clippy::unnecessary_wraps, reason = "as where it cannot")]
 fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
@@ -181,7 +182,7 @@ fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
     Ok(())
 }
 
-/// Returns an error if the block has an autopilot key: this image cannot sign.
+/// Returns an error if the configuration block has a key for the autopilot: this image cannot sign.
 #[cfg(not(feature = "mavlink-signing"))]
 fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
     if config::autopilot_key(board::block()).is_none() {

@@ -45,7 +45,7 @@ impl uav_relay::asynch::Clock for Time {
     }
 }
 
-/// Runs `task` forever: polls it after each interrupt or wake-up, and at the requested time.
+/// Runs `task` forever: polls it after each interrupt or wake-up, and at the time that it requested.
 ///
 /// Calls `also` after every poll.
 pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {

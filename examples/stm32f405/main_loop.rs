@@ -16,7 +16,7 @@ use crate::firmware::persistent;
 pub(crate) trait Links {
     /// Exchanges bytes between ports and relay. Returns the time by which the next call is due.
     ///
-    /// Changed votes are stored after receiving and before sending.
+    /// Changed votes on the chain's members are stored after receiving and before sending.
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
     fn log_counters(&self);

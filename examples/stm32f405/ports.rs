@@ -14,7 +14,7 @@ use uav_relay::serial::SerialPort as _;
 use crate::executor::Time;
 use crate::firmware::port::Port;
 
-/// Pause before the next attempt to write to a full port. In this time the UART sends 11 bytes.
+/// Pause before the next attempt to write to a port whose send queue is full. In this time the UART sends 11 bytes.
 const PAUSE: Duration = Duration::from_millis(1);
 
 pub(crate) struct Rx<'p>(&'p RefCell<Port>);

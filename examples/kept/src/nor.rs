@@ -8,18 +8,18 @@ use crate::journal::{BLANK, Flash};
 
 const WORD: usize = 4;
 
-/// Number of words per read or write of the flash. Several words are read at once, because a driver call takes longer
+/// Number of words that one driver call reads or writes. Single words would be slow, because a driver call takes longer
 /// than the transfer of a word.
 const PIECE: usize = 16;
 
-/// Two sectors of a NOR flash, given by their offsets. Each sector consists of one or more erase units.
+/// Journal storage in two sectors of a NOR flash, given by their offsets in the flash.
 ///
-/// The flash must read and write whole words.
+/// Each sector consists of one or more erase units. The flash must permit reads and writes of single words.
 #[derive(Debug)]
 pub struct Nor<F> {
     flash: F,
     sectors: [Range<u32>; 2],
-    /// Cache of the last read: sector, number of the first word, and the words.
+    /// Cache of the last read: number of the sector, index of the first word in the sector, the words.
     last: Option<(usize, usize, [[u8; WORD]; PIECE])>,
 }
 
@@ -36,7 +36,9 @@ impl<F: NorFlash> Nor<F> {
         }
     }
 
-    /// Returns the flash offset of word `first` of a sector, if `words` words from there fit.
+    /// Returns the flash offset of word `first` of a sector.
+    ///
+    /// `None` if the sector has fewer than `words` words from `first` on.
     fn place(&self, sector: usize, first: usize, words: usize) -> Option<u32> {
         let start = self.sectors.get(sector)?.start;
         let end = first.checked_add(words)?;
@@ -45,7 +47,7 @@ impl<F: NorFlash> Nor<F> {
         start.checked_add(bytes).filter(|_| is_in)
     }
 
-    /// Returns a word of a sector, read through the cache; `None` on a fault.
+    /// Returns word number `word` of a sector, read through the cache; `None` on a read fault.
     fn word(&mut self, sector: usize, word: usize) -> Option<u32> {
         let (first, at) = (word - word % PIECE, word % PIECE);
         if self

@@ -16,25 +16,27 @@ use crate::journal::{Flash, Journal, WhenFull, pack, unpack};
 /// Addresses of the two flash sectors for votes: sectors 1 and 2 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 
-/// Length of the relay's votes in the journal, words.
+/// Length of the relay's record of votes (on the chain's members) in the journal, words.
 pub const WORDS: usize = ViewRecord::LENGTH.div_ceil(4);
 
-/// Packs the relay's votes into words.
+/// Packs the relay's record of votes (on the chain's members) into words for the flash.
 pub fn pack_record(record: &ViewRecord) -> [u32; WORDS] {
     pack(&record.to_bytes())
 }
 
-/// Unpacks stored votes; `None` if the words do not have their format.
+/// Unpacks a stored record of votes (on the chain's members); `None` if the words are no valid record.
 pub fn unpack_record(kept: &[u32]) -> Option<ViewRecord> {
     ViewRecord::from_bytes(&unpack::<{ ViewRecord::LENGTH }>(kept))
 }
 
-/// Creates the journal of the relay's votes. `block` is the CRC of the configuration block.
+/// Creates the flash journal of the relay's votes on the chain's members.
+///
+/// `block` is the CRC of the configuration block. Records stored with a different CRC are ignored.
 pub const fn log<F: Flash>(flash: F, block: u32) -> Journal<F> {
     Journal::new(flash, WORDS, block)
 }
 
-/// State of the storage of the relay's votes: working, or failing.
+/// Storage of the relay's votes (on the chain's members) in flash: its state, working or failing.
 #[derive(Debug)]
 pub struct Views {
     /// True if the newest record of votes is in the flash.
@@ -42,12 +44,12 @@ pub struct Views {
 }
 
 impl Views {
-    /// Restores the votes from before the reboot.
+    /// Restores the relay's votes on the chain's members that were stored before the reboot.
     ///
-    /// Call it before any other use of the relay, but after a stored upload was restored.
+    /// Call it before any other use of the relay, but after a stored mission upload was restored.
     ///
-    /// `votes_restored` is called for a stored record, with true if the relay accepts it. A relay may reject the record
-    /// of a different firmware.
+    /// If a record of votes is stored, `votes_restored` is called, with true if the relay accepts the record. A relay
+    /// may reject the record of a different firmware.
     pub fn resume<F: Flash>(
         relay: &mut Relay,
         now: Instant,

@@ -18,7 +18,7 @@ use crate::options::Plan;
 /// Link number of the check in MAVLink signatures; in flight a different number is used.
 const LINK: u8 = 1;
 
-/// Age of the autopilot's last message, or of its last position, at which it counts as missing.
+/// Age from which the autopilot's last message or last position counts as missing.
 const SILENT: Duration = Duration::from_millis(3_000);
 
 /// Time between two heartbeats, and between two requests.
@@ -27,7 +27,7 @@ const EVERY: Duration = Duration::from_millis(1_000);
 /// Number of parameters requested at a time.
 const AT_A_TIME: usize = 6;
 
-/// Names of the parameter with the autopilot's MAVLink system number.
+/// Two possible names of the parameter with the autopilot's MAVLink system number.
 const SYSTEM: [&str; 2] = ["MAV_SYS_ID", "SYSID_THISMAV"];
 
 /// Parameters that ArduCopter 4.7 has renamed: old name, new name, and old unit / new unit.
@@ -38,7 +38,9 @@ const NEW_NAMES: [(&str, &str, f64); 2] = [
     ("SYSID_THISMAV", "MAV_SYSID", 1.0),
 ];
 
-/// Parameter in the bundle's file: its value there, and that in the autopilot, `None` until received.
+/// Parameter of the autopilot: its value in the parameter file, and its value in the autopilot.
+///
+/// The value in the autopilot is `None` until it is received.
 #[derive(Debug)]
 struct Parameter {
     name: String,
@@ -63,7 +65,7 @@ pub(super) struct Drone {
     parser: Parser,
     signing: Option<Signing>,
     axis: Axis,
-    /// Planned position of this drone, if any. `within_m` is the permitted distance from it.
+    /// Planned position of this drone, if any. `within_m` is the permitted distance from the planned position.
     planned: Option<Placement>,
     within_m: f32,
     /// Folder with the parameter files.
@@ -300,7 +302,7 @@ impl Drone {
         self.port.write(&frame);
     }
 
-    /// Returns the findings about the autopilot.
+    /// Returns the result lines of the check about the autopilot.
     pub(super) fn lines(&self, now: Instant) -> Vec<Line> {
         let heard = self.heard.filter(|heard| now.since(heard.at) < SILENT);
         let Some(heard) = heard else {

@@ -31,7 +31,7 @@ use crate::relay::{auth, seed};
 use drone::Drone;
 use radio::Radio;
 
-/// Line of the check: subject and finding.
+/// Result line of the check: its subject, such as `autopilot`, and its finding (green or red).
 pub(crate) type Line = (&'static str, Finding);
 
 /// Time for which the check still answers its neighbours after all lines of the check are green.
@@ -48,12 +48,13 @@ const FREE: u64 = 64 << 20;
 /// Seconds from 1970 to 2024. A clock that shows an earlier time has not been set.
 const YEAR_2024_S: u64 = 1_704_067_200;
 
-/// Name of the bundle's udev rules, in the folder of the configuration or in /etc/udev/rules.d.
+/// Name of the file with udev rules, in the folder of the configuration or in /etc/udev/rules.d.
 const RULES: &str = "70-uav-relay.rules";
 
 /// Checks this computer, then the autopilot and the neighbours for at most `limit`.
 ///
-/// At first the check only receives. Prints all lines; returns true if all are green.
+/// At first the check only receives from the neighbours, and sends them nothing. Prints all lines; returns true if all
+/// are green.
 pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     let options = &plan.options;
     let (mut lines, ports) = ports(plan);
@@ -190,7 +191,9 @@ fn print((subject, finding): &Line) {
     let _ = writeln!(std::io::stdout(), "{colour:<6} {subject:<11} {text}");
 }
 
-/// Opens the ports toward other relays. Returns a line for each; the ports only if all are open.
+/// Opens the ports toward other relays. Returns a result line for each port, and the opened ports.
+///
+/// The opened ports are `None` if any port could not be opened.
 fn ports(plan: &Plan) -> (Vec<Line>, Option<Vec<(Port, Tty)>>) {
     let options = &plan.options;
     let named = [
@@ -234,7 +237,7 @@ fn clock(now: SystemTime) -> Result<String, String> {
     Ok(text.to_string())
 }
 
-/// Returns the free space for `file`, bytes. For the test, a file is written to the folder of `file`.
+/// Returns the free disk space for `file`, bytes. Tests first if a file can be written to the folder of `file`.
 fn space(file: &Path) -> Result<u64, String> {
     let failed = |error: std::io::Error| format!("cannot be written: {error}");
     let folder = file
@@ -277,7 +280,7 @@ fn space(file: &Path) -> Result<u64, String> {
     Ok(free)
 }
 
-/// Checks the stored records of earlier starts.
+/// Checks that no votes and no uploaded mission are stored from earlier starts of the program.
 fn records(plan: &Plan) -> Vec<Line> {
     let mut lines = Vec::new();
     if let Some(file) = &plan.options.view_file {
@@ -323,7 +326,7 @@ fn records(plan: &Plan) -> Vec<Line> {
     lines
 }
 
-/// Checks the bundle's udev rules; `None` if there are no rules and no port needs one.
+/// Checks the file with udev rules. `None` if it is missing and no port has a name given by such a rule.
 fn rules(plan: &Plan) -> Option<Line> {
     let options = &plan.options;
     let ports = [&options.upstream, &options.downstream, &options.shared];

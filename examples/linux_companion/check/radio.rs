@@ -32,39 +32,39 @@ use crate::relay::seed;
 /// Silence of a neighbour after which a heartbeat is requested.
 const PROBE_AFTER: Duration = Duration::from_millis(2_000);
 
-/// Number of remembered own frames, to recognise their echoes.
+/// Number of sent frames that the check remembers, to recognise their echoes.
 const REMEMBERED: usize = 64;
 
 /// Minimum number of damaged frames at which a wrong data rate is suspected.
 const DAMAGED: u32 = 5;
 
-/// Age from which on received data are ignored.
+/// Age from which on data received from a neighbour are ignored.
 const OLD: Duration = Duration::from_millis(10_000);
 
-/// Margin of the listening time, which is the longest lease-renewal period plus this margin.
+/// Time added to the longest lease-renewal period. Before it sends, the check listens for their sum.
 const RESERVE: Duration = Duration::from_millis(2_000);
 
-/// Maximum change of a reported position, m, for a drone on the ground.
+/// Maximum distance of a drone's reported position from the first one, m, for a drone on the ground.
 const STANDS_WITHIN_M: f32 = 5.0;
 
 /// Data about a neighbour, from frames that name it as their sender.
 #[derive(Clone, Copy, Debug, Default)]
 struct Heard {
-    /// Time of the neighbour's last frame in this network, to any relay.
+    /// Time of the last frame that the neighbour sent to any relay in this network.
     received: Option<Instant>,
     /// Time of the neighbour's last frame to this relay with a correct authentication tag.
     verified: Option<Instant>,
-    /// Time of the neighbour's last message that confirms that it receives this relay.
+    /// Time of the neighbour's last message that confirms that the neighbour receives this relay.
     hears: Option<Instant>,
     /// True if the neighbour's drone flies.
     flies: bool,
-    /// True once the neighbour has sent a lease renewal, so its chain has agreed on positions.
+    /// True once the neighbour has sent a lease renewal. This shows that its chain has agreed on positions.
     takes_part: bool,
-    /// First position that the neighbour reported while its relay did not control the drone, if any.
+    /// First position that the neighbour reported while its drone did not fly to setpoints, if any.
     stands: Option<Placement>,
     /// Digest of the neighbour's mission; `None` if not received yet.
     mission: Option<u16>,
-    /// Number of frames signed with a wrong key.
+    /// Number of frames from the neighbour that were signed with a wrong key.
     forged: u32,
     unsigned: u32,
     network: Option<u16>,
@@ -90,7 +90,7 @@ pub(super) struct Radio {
     epoch: Option<u32>,
     heard: BTreeMap<u16, Heard>,
     sent: VecDeque<Vec<u8>>,
-    /// Number of frames from a second node with this relay's number.
+    /// Number of frames from another node that uses this relay's number, too.
     twins: u32,
     damaged: u32,
     sends_from: Instant,
@@ -146,10 +146,10 @@ impl Radio {
         self.sends_from
     }
 
-    /// Returns the numbers of the relays that may fly.
+    /// Returns the numbers of the relays that may be in flight.
     ///
-    /// A relay may fly if it reports that it does. A member of a chain also may, unless it has reported that its drone
-    /// is on the ground.
+    /// A relay may be in flight if it reports so. It may also be in flight if its chain has agreed on positions, unless
+    /// it has reported that its drone is on the ground.
     fn flying(&self) -> Vec<String> {
         let flies = |heard: &Heard| heard.flies || heard.takes_part && heard.stands.is_none();
         let flying = self.heard.iter().filter(|(_, heard)| flies(heard));
@@ -207,7 +207,7 @@ impl Radio {
         }
     }
 
-    /// Returns the whole frames received at a port, each with its delimiter.
+    /// Returns the complete frames received at port number `at`, each with its final delimiter.
     fn read(&mut self, at: usize) -> Vec<(Port, Vec<u8>)> {
         let Some(wire) = self.wires.get_mut(at) else {
             return Vec::new();
@@ -290,7 +290,7 @@ impl Radio {
         }
     }
 
-    /// Returns the findings about chain, neighbours and this relay's number.
+    /// Returns the result lines of the check about chain, neighbours and this relay's number.
     pub(super) fn lines(&self, now: Instant) -> Vec<Line> {
         let flying = self.flying();
         let mut lines = vec![(
@@ -385,7 +385,7 @@ impl Radio {
 }
 
 impl Heard {
-    /// Records whether the sender of a message flies, and whether its chain has agreed on positions.
+    /// Records that the neighbour's drone flies, or that its chain has agreed on positions, if a message shows it.
     fn observe(&mut self, content: &Content) {
         let Content::Message(message) = content else {
             return;
@@ -406,13 +406,14 @@ impl Heard {
 
 /// Content of an intact frame.
 enum Content {
-    /// Handshake with the receiver's epoch, as far as the sender knows it.
+    /// Handshake with the epoch of the relay that receives it, as far as the sender knows this epoch.
     Handshake(u32),
     Message(Message),
 }
 
 impl Content {
-    /// Returns true for a message that cannot affect any agreement. Only such messages are received or sent.
+    /// Returns true for a message that cannot affect any agreement of a chain. The check receives and sends no other
+    /// messages.
     const fn is_harmless(&self) -> bool {
         use Message::{Claim, Heartbeat, Hello};
         matches!(
@@ -422,7 +423,9 @@ impl Content {
     }
 }
 
-/// Returns true if the drone of a report's entry is in the air: standby, engaged or blind.
+/// Returns true if a relay's entry in a report shows that its drone is in the air.
+///
+/// The control states in the air are standby, engaged and blind.
 const fn is_in_air(entry: &Entry) -> bool {
     entry.control() >= 3
 }

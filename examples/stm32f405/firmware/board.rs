@@ -15,7 +15,7 @@ pub(crate) fn block() -> &'static Block {
     unsafe { &*(config::ADDRESS as *const Block) }
 }
 
-/// Enables an interrupt. The interrupt's driver must be in place before.
+/// Enables an interrupt. The driver that the interrupt uses must be set up before.
 pub(crate) fn unmask(interrupt: Interrupt) {
     // SAFETY: no critical section of this program relies on a single interrupt being masked.
     unsafe { NVIC::unmask(interrupt) };
@@ -40,7 +40,7 @@ pub(crate) fn seed() -> u32 {
     seed
 }
 
-/// Feeds the watchdog and sleeps, forever. For a drone that cannot join the chain.
+/// Feeds the watchdog and sleeps, forever. Called if the drone cannot join the chain.
 ///
 /// If no clock wakes the chip, the watchdog restarts it.
 pub(crate) fn stop() -> ! {
@@ -50,7 +50,7 @@ pub(crate) fn stop() -> ! {
     }
 }
 
-/// Panic handler that makes the link fail if it is used.
+/// Panic handler that makes the linker fail if a panic is reachable.
 ///
 /// An image that links has no reachable panic, which `cargo cost` proves.
 #[cfg(prove_no_panic)]
@@ -85,7 +85,7 @@ mod defmt_frames {
     #[defmt::global_logger]
     struct Logger;
 
-    /// True if interrupts were enabled before the log frame: then the end of the frame enables them again.
+    /// True if interrupts were enabled before the present log frame; its end then enables them again.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
     // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame,

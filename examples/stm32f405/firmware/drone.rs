@@ -13,16 +13,16 @@ use super::flash;
 use super::{board, config, log, persistent};
 use crate::autopilot::{Autopilot, Uart};
 
-/// Relay, state of its stored votes, and the autopilot link, if any. Both relay and link are in static RAM.
+/// Relay, storage of its votes (on the chain's members), and autopilot link, if any. All are in static RAM.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut persistent::Views,
     pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
-/// Creates the drone of the configuration block; `None` if the drone cannot fly.
+/// Creates relay and autopilot link from the configuration block; `None` if the drone cannot fly.
 ///
-/// Neither [`switch_on`] nor this function is inlined, so that their stack frames are freed.
+/// This function and [`switch_on`] are not inlined, so that their stack frames are freed when they return.
 #[inline(never)]
 pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     let field = cortex_m::singleton!(FIELD: config::FieldStorage = config::EMPTY)?;
@@ -57,7 +57,8 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
 
 /// Creates the relay in static RAM, to save stack; `None` if the relay rejects the configuration.
 ///
-/// The relay rejects settings that need a feature this image lacks, and the joint method for more than 100 relays.
+/// The relay rejects a setting that needs a feature missing in this image. It also rejects the joint method for more
+/// than 100 relays.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,
@@ -80,13 +81,13 @@ fn switch_on(
         .ok()
 }
 
-/// Error: the block has a signing key, but frames cannot be signed.
+/// Error: the configuration block has a signing key, but frames cannot be signed.
 struct CannotSign;
 
 /// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 ///
-/// If the flash cannot be written, as in an emulator, the epoch is still larger than all stored ones and not below the
-/// block's. But the next start may use the same epoch.
+/// If the flash cannot be written, as in an emulator, the epoch is still larger than all stored epochs, and at least
+/// the epoch in the block. The next start may then use the same epoch again.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {

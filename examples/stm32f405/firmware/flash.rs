@@ -119,7 +119,7 @@ impl Sector {
         flash.acr().modify(|_, w| w.dcen().set_bit());
     }
 
-    /// Writes words from word `first` on; returns true if the words are read back correctly.
+    /// Writes `words` from word `first` of this sector on. Returns true if they are read back correctly.
     ///
     /// Stops the CPU for about 16 microseconds a word.
     #[inline(never)]
@@ -146,7 +146,7 @@ impl Sector {
     }
 }
 
-/// Value of the field PSIZE in the flash's control register: 32 bits at once, which 3.3 V permit.
+/// Value of the field PSIZE in the flash's control register: writes of 32 bits, possible at 3.3 V.
 const BY_WORD: u8 = 2;
 
 /// Unlocks the flash registers for writing.

@@ -321,7 +321,9 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
     }
 }
 
-/// Logs that votes were found after a reboot, and whether the relay accepts them.
+/// Logs that stored votes on the chain's members were found after a reboot.
+///
+/// `accepted` is true if the relay accepts these votes.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's members from before this start were read from flash");
@@ -332,7 +334,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     }
 }
 
-/// Logs that storing the relay's votes works again (true) or fails (false).
+/// Logs that storing the relay's votes on the chain's members works again (true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
         info!("votes on the chain's members can be stored in flash again");

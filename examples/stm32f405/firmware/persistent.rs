@@ -41,16 +41,16 @@ fn uploads() -> Journal<Sectors> {
 pub(crate) struct Views(views::Views);
 
 impl Views {
-    /// Restores the votes from before the reboot into a new `relay`.
+    /// Restores the votes on the chain's members from before the reboot into a new `relay`.
     ///
-    /// Call it before any other use of the relay, but after a stored upload was restored.
+    /// Call it before any other use of the relay, but after a stored mission upload was restored.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());
         Self(views::Views::resume(relay, now, log, log::votes_restored))
     }
 
-    /// Stores the relay's votes. Returns true even if the write fails: the relay flies on.
+    /// Stores the relay's votes on the chain's members. Returns true even if the write fails: the flight continues.
     pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
         if let Some(stored) = self.0.store(record, views::log(flash::VIEWS, block())) {
             log::votes(stored);
@@ -59,7 +59,7 @@ impl Views {
     }
 }
 
-/// Returns the CRC of the configuration block, its last four bytes.
+/// Returns the CRC of the configuration block, which is in the last four bytes of the block.
 fn block() -> u32 {
     let bytes = board::block().last_chunk();
     bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes))

@@ -36,7 +36,7 @@ pub(crate) struct Pins {
     pub(crate) second: Second,
 }
 
-/// Peripherals for a port to a second neighbour, at USART3.
+/// Peripherals of the port at USART3, which leads to the neighbour toward the receiver.
 #[allow(dead_code, reason = "the second neighbour's port")]
 pub(crate) struct Second {
     pub(crate) usart: USART3,

@@ -45,7 +45,7 @@ pub(crate) struct Served<U: Instance> {
 pub(crate) type Slot<U> = Mutex<RefCell<Option<Served<U>>>>;
 
 impl<U: Instance> Served<U> {
-    /// Moves received bytes to the receive queue, and queued bytes to the UART, as far as possible.
+    /// Moves bytes from the UART to the receive queue and from the send queue to the UART, if possible.
     fn exchange(&mut self) {
         let Self { uart, end } = self;
         loop {
@@ -64,13 +64,14 @@ impl<U: Instance> Served<U> {
     }
 }
 
-/// Returns the settings of a UART whose clock is `apb_hz`. The HAL assumes a different clock, so the bit rate is
-/// corrected.
+/// Returns the settings of a UART whose clock has the frequency `apb_hz`, Hz.
+///
+/// The HAL assumes a different clock frequency, so the bit rate is corrected.
 pub(crate) fn config(apb_hz: u32) -> Config {
     Config::default().baudrate(compensated_baud(BAUD, apb_hz).bps())
 }
 
-/// Passes the UART to its interrupt handler. Returns the main loop's port with the same queues.
+/// Passes the UART to its interrupt handler. Returns the port by which the main loop uses the handler's queues.
 pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     mut uart: Serial<U>,
     interrupt: Interrupt,

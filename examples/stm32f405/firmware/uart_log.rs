@@ -23,7 +23,7 @@ struct Log {
     port: Option<Port>,
     encoder: defmt::Encoder,
     frame: Frame,
-    /// True if the present log frame exceeds its buffer and must be dropped.
+    /// True if the log frame being written exceeds its buffer and must be dropped.
     cut: bool,
     lost: u32,
 }

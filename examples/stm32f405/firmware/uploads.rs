@@ -25,7 +25,7 @@ pub fn pack_upload(upload: &Upload) -> [u32; WORDS] {
     pack(&bytes)
 }
 
-/// Unpacks a stored upload; `None` if the words do not have its format.
+/// Unpacks a stored mission upload; `None` if the words are no valid upload.
 pub fn unpack_upload(words: &[u32]) -> Option<Upload> {
     Upload::decode(&unpack::<{ Upload::LENGTH }>(words))
 }

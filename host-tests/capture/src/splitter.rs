@@ -1,14 +1,14 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Maximum number of bytes kept of a piece. A longer one cannot be a frame.
+/// Maximum number of bytes kept of a piece of the stream. A piece longer than this cannot be a frame.
 pub const MOST: usize = 1_024;
 
-/// Bytes from one frame delimiter to the next, including the latter: usually a frame.
+/// Bytes of a stream after one frame delimiter, up to and including the next one: usually a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Piece<'a> {
     /// Bytes of the piece with its delimiter, at most [`MOST`].
     pub bytes: &'a [u8],
-    /// Length of the whole piece, bytes. It exceeds `bytes` if those are cut.
+    /// Length of the whole piece, bytes. It is larger than `bytes.len()` if the piece was cut to [`MOST`] bytes.
     pub len: usize,
 }
 
@@ -25,7 +25,7 @@ impl FrameSplitter {
     /// Work is linear in the number of bytes, memory at most [`MOST`].
     ///
     /// # Errors
-    /// The first error of `take`; the bytes after that piece are lost.
+    /// The first error of `take`. The rest of `bytes` after the piece that was passed to `take` is lost.
     pub fn push<E>(
         &mut self,
         bytes: &[u8],

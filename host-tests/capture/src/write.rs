@@ -22,7 +22,7 @@ const PACKET_FLAGS: u16 = 2;
 /// Resolution of the timestamps in a capture: 10^-9 s. A pcapng file has only the exponent, 9.
 const NANOSECONDS: u8 = 9;
 
-/// Direction of a frame, seen from the node that writes the capture.
+/// Direction of a frame, seen from the node at which the capture is made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Direction {
     /// Frame between other nodes, or of unknown direction.
@@ -51,11 +51,11 @@ pub struct Interface(u32);
 /// Frame to be written to a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Frame<'a> {
-    /// Time of the frame's last byte, since 1970; in a simulation, virtual time since the start.
+    /// Time of the frame's last byte: since 1970, or in a simulation the virtual time since the start.
     pub at: Duration,
     /// Bytes of the frame on the wire: COBS, with the final delimiter.
     pub bytes: &'a [u8],
-    /// Length of the whole frame, bytes. It exceeds `bytes` if those are cut.
+    /// Length of the whole frame, bytes. It is larger than `bytes.len()` if the frame was cut.
     pub len: usize,
     /// Direction of the frame.
     pub direction: Direction,

@@ -10,9 +10,9 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, MOST};
 
-/// Splits a byte stream that arrives in the portions `reads`. Returns each piece with its length.
+/// Splits a byte stream that arrives in the portions `reads` into pieces.
 ///
-/// Also returns the length of the incomplete piece at the end.
+/// Returns each piece with its length, and the length of the incomplete piece at the end of the stream.
 fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
     let (mut cut, mut all) = (FrameSplitter::default(), Vec::new());
     for read in reads {

@@ -13,7 +13,7 @@ pub const MOST_BAUD: u32 = 10_000_000;
 /// Error of a command: one line for standard error, and the exit status.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Failure {
-    /// Exit status: 1 if the request cannot be met, 2 if the input is wrong.
+    /// Exit status: 1 if the input is right but the request cannot be met, 2 if the input is wrong.
     pub status: u8,
     /// Error message of the command, one line.
     pub line: String,
@@ -93,7 +93,7 @@ pub fn print_line(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Prints `text` on standard output. A closed pipe, for example to `head`, is ignored.
+/// Prints `text` on standard output. A closed standard output, as after `| head`, is ignored.
 pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
@@ -168,7 +168,7 @@ where
 /// Parses the name of an output file. `-` is rejected, because the report goes to standard output.
 ///
 /// # Errors
-/// The name is empty or `-`; the message names the alternative.
+/// The name is empty or `-`. For `-` the message states how a file of this name is given.
 pub fn file(text: &str) -> Result<PathBuf, String> {
     match text {
         "" => Err("must be the name of a file".to_owned()),

@@ -142,7 +142,7 @@ fn solve(options: &Options) -> Result<Results, Failure> {
 
 /// Solves one problem with this crate, and then with every other solver.
 ///
-/// Each other solver also reports when it first reaches the SIR of this crate's chain.
+/// Each other solver also reports the time at which its SIR first reached that of this crate's chain.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
     let mut runs = own::runs(problem)?;
     let level = table::level(problem, &runs)?;

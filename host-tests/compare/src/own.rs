@@ -27,7 +27,7 @@ const LONG_ENOUGH: Duration = Duration::from_millis(200);
 
 /// Solves `problem` with this crate: first in one computation, then with relays that exchange messages.
 ///
-/// Other solvers are compared with the first result.
+/// Other solvers are compared with the result of the one computation.
 pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     let briefed = mission::mission(&problem.scenario()?, problem.relays, TOLERANCE);
     let (mission, _) = briefed.map_err(|error| error.to_string())?;
@@ -63,7 +63,7 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
 
 /// Computes the positions of all relays from the mission alone, as the leader of a chain predicts them.
 ///
-/// For N relays the search evaluates whole chains, at most about fifty, and then one hop N^2 / 2 times.
+/// For N relays the search evaluates at most about fifty whole chains, and then N^2 / 2 single hops.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     let none = || "no target SIR can be met".to_owned();
     let common = |_| mission.config().common;
@@ -91,7 +91,7 @@ fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
         .ok_or_else(|| format!("the chain ended {:?}", outcome.ending))
 }
 
-/// Returns the median processor time of one run of `work` over several batches, s, and its result.
+/// Runs `work` in several batches. Returns its median processor time per run, s, and its result.
 fn timed<T>(work: impl Fn() -> Result<T, String>) -> Result<(f64, T), String> {
     // Not timed: it fills the caches.
     let result = work()?;

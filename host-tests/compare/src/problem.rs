@@ -24,9 +24,9 @@ pub(crate) struct Problem {
     pub(crate) relays: u16,
 }
 
-/// True optima (linear SIR) for each kind of problem and number of relays, to nine or ten digits.
+/// Best possible SIR (linear) for each kind of problem and number of relays, to nine or ten digits.
 ///
-/// An independent program has computed them.
+/// An independent program has computed these optima.
 const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (
         Choice::Places,
@@ -71,7 +71,7 @@ impl fmt::Display for Problem {
 }
 
 impl Problem {
-    /// Returns the true optimum (linear SIR); `None` if the problem is not in [`all`].
+    /// Returns the best possible SIR (linear) of this problem; `None` if the problem is not in [`all`].
     pub(crate) fn optimum(self) -> Option<f64> {
         let (_, optima) = OPTIMA.iter().find(|(choice, _)| *choice == self.choice)?;
         let known = optima.iter().find(|(relays, _)| *relays == self.relays)?;
@@ -92,7 +92,7 @@ impl Problem {
         }
     }
 
-    /// Returns link and limits (altitude and lateral position) of the problem, as other solvers use them.
+    /// Returns the link of the problem, and the limits of altitude and lateral position, for other solvers.
     pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {

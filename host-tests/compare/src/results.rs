@@ -52,10 +52,10 @@ pub(crate) struct Solution {
     pub(crate) sir: f64,
     /// Position of every relay (x, y, altitude; m), from the transmitter on.
     pub(crate) chain: Chain,
-    /// First chain of the run whose SIR is within [`crate::score::GOOD`] of the optimum, if any.
+    /// First chain found in the run whose SIR is within [`crate::score::GOOD`] of the optimum, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) good: Option<Mark>,
-    /// First chain of the run with at least the SIR of this crate's chain, if any.
+    /// First chain found in the run with at least the SIR of this crate's chain, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) level: Option<Mark>,
     /// True if the time limit ended the run.

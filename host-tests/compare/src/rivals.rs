@@ -109,7 +109,7 @@ impl Rivals {
         &self.versions
     }
 
-    /// Solves `problem` with `solver`. The result has when its SIR (linear) first reached `level`.
+    /// Solves `problem` with `solver`. The result also has the time at which its SIR (linear) first reached `level`.
     pub(crate) fn run(
         &mut self,
         solver: Solver,

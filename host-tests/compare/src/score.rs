@@ -7,7 +7,9 @@ use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
 use crate::results::{Mark, Solution};
 
-/// Maximum relative difference from the optimum SIR for a good chain. The mission has the same tolerance.
+/// Maximum relative difference from the optimum SIR for a good chain.
+///
+/// The target SIR of this crate's mission has the same tolerance.
 pub(crate) const GOOD: f64 = 1e-4;
 
 /// Tolerance of a position, m: 16 times the rounding error of an f32 near 1000 m.
@@ -52,7 +54,7 @@ impl fmt::Display for Refusal {
 
 /// Checks a chain against the constraints, and returns the SIR (linear) of its worst hop.
 ///
-/// `room` limits altitudes and lateral positions. `chain` has [x, y, altitude] of each relay, m.
+/// `room` has the limits of altitude and lateral position. `chain` has [x, y, altitude] of each relay, m.
 pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f64, Refusal> {
     let count = Refusal::Count(chain.len());
     if chain.len() != link.len() {

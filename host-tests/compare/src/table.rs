@@ -113,7 +113,7 @@ fn circumstances(results: &Results) -> String {
     )
 }
 
-/// Returns the SIR (linear) of this crate's chain, the first run.
+/// Returns the SIR (linear) of this crate's chain, which is the first one in `runs`.
 pub(crate) fn level(problem: Problem, runs: &[Run]) -> Result<f64, String> {
     let (link, room) = problem.link()?;
     match runs.first().map(|own| &own.answer) {
@@ -134,7 +134,7 @@ struct Line {
     all: String,
 }
 
-/// Name of a solver, and its cells in a table row, or why its chain does not count.
+/// Name of a solver with its cells in a table row, or with the reason why its chain does not count.
 type Entry<'a> = (&'a str, Result<Line, String>);
 
 fn rows(solved: &Solved) -> Result<String, String> {
@@ -158,7 +158,9 @@ fn rows(solved: &Solved) -> Result<String, String> {
     Ok(text)
 }
 
-/// Returns the table rows of all solvers of one problem: cells, or why the chain does not count.
+/// Returns the table rows of one problem, one row for each solver.
+///
+/// A row has the solver's cells, or the reason why its chain does not count.
 fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     let problem = solved.problem;
     let optimum = problem

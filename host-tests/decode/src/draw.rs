@@ -13,7 +13,7 @@ use crate::format::{Field, Kind, Layout};
 use crate::range::{Numbers, bounds, has_room, targets};
 use crate::value::{Fields, Value};
 
-/// Message fields with their usual range, from which half of the values are drawn.
+/// Fields of messages, each with its usual range. Half of a field's values are drawn from this range.
 const ORDINARY: [(&str, f64, f64); 13] = [
     ("anchor", 0.25, 4.0),
     ("altitude_m", 15.0, 400.0),
@@ -74,9 +74,9 @@ impl<'s> Draw<'s> {
         self.hinted(layout, &mut |_, _| None)
     }
 
-    /// Draws the fields of a message. `hint` may choose a number, even one outside its permitted range.
+    /// Draws the fields of a message. `hint` may choose the number of a field, even one out of range.
     ///
-    /// If `hint` returns `None`, the number is random and in range.
+    /// If `hint` returns `None`, the field gets a random number in its permitted range.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
         obey_rules(&layout.name, &mut fields);
@@ -192,7 +192,9 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws the 32-bit name of a proposed view: its number, at least 1, and its proposer's node number.
+    /// Draws the 32-bit name of a proposed view (membership of the chain).
+    ///
+    /// The name has the view's number, at least 1, and the node number of its proposer.
     fn view(&mut self) -> u32 {
         let most = 0x003F_FFFF;
         let number = match self.byte() % 8 {
@@ -208,7 +210,7 @@ impl<'s> Draw<'s> {
         number << 10 | node
     }
 
-    /// Draws fields with arbitrary numbers, in range or not. Such fields can always be encoded.
+    /// Draws fields with arbitrary values, possibly out of range. Such fields can always be encoded.
     pub fn arbitrary<'f>(&mut self, fields: &'f [Field]) -> Fields<'f> {
         let draw = fields.iter().map(|field| (field, self.any(&field.kind)));
         Fields(draw.collect())
@@ -258,7 +260,9 @@ impl<'s> Draw<'s> {
     }
 }
 
-/// Reorders the views in a Decision into ascending order: base, accepted, proposed.
+/// Reorders the views (memberships of the chain) in a Decision message into ascending order.
+///
+/// The order is base view, accepted view, proposed view.
 fn decision(fields: &mut Fields<'_>) {
     let get = |fields: &Fields<'_>, name: &str| Numbers(fields).get(name);
     let (base, view) = (get(fields, "base_view"), get(fields, "proposed_view"));
@@ -375,7 +379,7 @@ fn list<'f>(fields: &mut Fields<'f>, name: &str, change: impl FnOnce(&mut Vec<Va
     }
 }
 
-/// Reorders the four views in a Proposal so that they ascend, as the format requires.
+/// Reorders the four views (memberships of the chain) in a Proposal into the format's ascending order.
 ///
 /// The order: view agreed on, view accepted after it, proposal of the accepted view, proposed view.
 fn proposal(fields: &mut Fields<'_>) {

@@ -27,7 +27,7 @@ pub fn unsigned(header: Header, body: &[u8]) -> Vec<u8> {
     sealed(before(header, 0, body))
 }
 
-/// Returns the frame `plain` as on the wire: encoded by COBS (of a second crate), with the delimiter.
+/// Returns the frame `plain` as sent on the wire: encoded by another crate's COBS, with the delimiter.
 pub fn stuffed(plain: &[u8]) -> Vec<u8> {
     let mut out = cobs::encode_vec(plain);
     out.push(0);
@@ -36,7 +36,8 @@ pub fn stuffed(plain: &[u8]) -> Vec<u8> {
 
 /// Decodes `stuffed`, a frame without its delimiter, by the definition of COBS.
 ///
-/// Also returns true if the last COBS run is complete. If it is not, the bytes up to the cut are returned as well.
+/// Also returns true if the last COBS run (bytes after a code byte) is complete. If the run is cut short, its existing
+/// bytes are returned, too.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {
     let mut plain = Vec::with_capacity(stuffed.len());
     let (mut rest, mut whole) = (stuffed, true);

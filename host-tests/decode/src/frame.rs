@@ -25,7 +25,7 @@ pub struct Frame<'f> {
     pub handshake: bool,
     /// Decoded fields of the body, up to the first field that cannot be decoded.
     pub fields: Fields<'f>,
-    /// Signed part of the frame (header and body), and the frame's authentication tag, if it has one.
+    /// Signed bytes of the frame (header and body), and its authentication tag; `None` without a tag.
     pub tag: Option<(Vec<u8>, [u8; TAG])>,
     /// Reason why a receiver rejects the frame; `None` if it accepts the frame.
     pub refusal: Option<Refusal>,
@@ -33,8 +33,8 @@ pub struct Frame<'f> {
 
 /// Decodes a frame. `wire` has the bytes of the frame with its delimiter, or only the first of these bytes.
 ///
-/// `len` is the length of the whole frame on the wire. The crate's decoder decides if a receiver rejects the frame.
-/// The tables of `FORMAT.md` give the fields, and the reason.
+/// `len` is the length of the whole frame on the wire. The crate's decoder determines if a receiver rejects the frame.
+/// The fields, and the reason for a rejection, follow from the tables of `FORMAT.md`.
 pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
     let mut frame = Frame {
         len,

@@ -233,7 +233,7 @@ fn check_rules(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str>
     rules.find(|(_, holds)| !holds).map(|(name, _)| *name)
 }
 
-/// Returns true if the relays of an Offer fit between Tx and Rx at their minimum separation.
+/// Returns true if the relays of an Offer (mission) fit between Tx and Rx at their minimum separation.
 pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     let single = |number: f64| f64::from(number as f32);
     let distance = offer.get("distance_m");
@@ -243,9 +243,9 @@ pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
 
 /// Returns the target SIRs (linear) that a sweep message lists in compact form, in ascending order.
 ///
-/// `anchor` is one of the targets. `gap` encodes the gap from `anchor` to the next target, as a fraction of `anchor`; 0
-/// for a single target. `growth` encodes the factor from each gap to the next. Results are rounded to f32, as in a
-/// relay.
+/// `anchor` is one of the targets. `gap` encodes the gap from `anchor` to the next higher target, as a fraction of
+/// `anchor`; with 0 there is a single target. `growth` encodes the factor from each gap to the next. Results are
+/// rounded to f32, as in a relay.
 pub fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];

@@ -2,20 +2,20 @@
 
 use std::fmt;
 
-/// Reason for rejecting a frame: the first one that a receiver finds.
+/// Reason for rejecting a frame. If there are several, it is the first one that a receiver finds.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Refusal {
     /// The stream ends before the frame's delimiter.
     Unended,
     /// The frame is too long. The value is its length on the wire, bytes.
     Oversized(usize),
-    /// The frame was cut short: there is a delimiter inside a COBS run.
+    /// The frame was cut short: its delimiter is inside a COBS run (bytes after a code byte).
     Truncated,
     /// The frame is too short for header and CRC, or for the tag. The value is its length without COBS, bytes.
     Short(usize),
     /// The CRC is wrong. The values are the received and the computed CRC.
     Crc(u32, u32),
-    /// The version of the format or the flags are unknown. The values are the version and the flags.
+    /// The format version or the header flags are unknown. The values are version and flags of the frame.
     Version(u8, u8),
     /// The message tag (kind of message) is unknown.
     UnknownTag(u8),

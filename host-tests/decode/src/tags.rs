@@ -16,7 +16,7 @@ pub enum TagCheck {
     Wrong,
     /// The tag was not checked, because the network key is unknown.
     NoKey,
-    /// The tag was not checked, because no handshake of the two nodes was captured.
+    /// The tag was not checked, because no handshake between sender and destination was captured.
     NoHandshake,
 }
 
@@ -44,10 +44,10 @@ impl TagCheck {
 
 /// Number of newest nonces stored for a node. A tag counts as right if it is right with any of them.
 ///
-/// The last one is not enough: a frame signed before a new handshake can arrive after it.
+/// The newest nonce alone is not enough: a frame signed before a handshake can arrive after the handshake.
 const TRIED: usize = 4;
 
-/// Map key of the stored nonces: network, sender and destination.
+/// Key under which nonces are stored: the numbers of network, sender and destination.
 type Pair = (u16, u16, u16);
 
 /// Verifier of authentication tags, with the nonces of all captured handshakes.

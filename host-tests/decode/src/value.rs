@@ -16,7 +16,7 @@ pub enum Value<'f> {
     Signed(i64),
     /// Digest of a mission, of a view, or of the line between the Tx and Rx positions.
     Digest(u16),
-    /// Name of a view (membership of the chain): number and proposer.
+    /// Name of a view (membership of the chain): the view's number and its proposer's node number.
     View(u32),
     /// Floating-point number, f32.
     Single(f32),
@@ -112,7 +112,7 @@ impl<'a, 'de> IntoDeserializer<'de> for &'a Fields<'_> {
     }
 }
 
-/// Returns the names of the flags set in `bits`; `bit 7` for a flag without a name.
+/// Returns the names of the flags that are set in `bits`. A flag without a name is named `bit 7`, for example.
 pub(crate) fn set(bits: u8, names: &[String]) -> Vec<String> {
     let set = (0..8).filter(|bit| bits >> bit & 1 == 1);
     let name = |bit: usize| match names.get(bit) {

@@ -15,7 +15,7 @@ const FILE: &str = include_str!("../../tests/data/vectors.json");
 pub struct Vectors {
     /// Valid frames without a tag.
     pub frames: Vec<Frame>,
-    /// Handshakes and a message, with tags, in the order of sending.
+    /// Handshakes and a message, all with authentication tags, in the order of sending.
     pub signed: Vec<Signed>,
     /// Lists of target SIRs, with their compact form in a sweep message.
     pub ladders: Vec<Ladder>,
@@ -54,7 +54,7 @@ pub struct Header {
     pub sender: u16,
     /// Node number of the frame's destination.
     pub destination: u16,
-    /// Counter of the sender's frames, as in the header.
+    /// Frame counter of the sender, as in the frame's header.
     pub counter: u32,
 }
 
@@ -76,11 +76,11 @@ pub struct Signed {
 /// Test vector: a list of target SIRs, and its compact form in a sweep message.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Target SIR with index 7 of 16 (from 0), or the only target: the bits of its f32, hexadecimal.
+    /// Target SIR with index 7 (from 0) of 16, or the single target. The text has the bits of its f32, hexadecimal.
     pub anchor: String,
-    /// Code of the gap from the anchor to the next targets (a ratio); 0 for a single target.
+    /// Code of the gap from the anchor to the next higher target SIR, as a ratio; 0 for a single target.
     pub gap: u8,
-    /// Code of the factor between two consecutive gaps, counted away from the anchor.
+    /// Code of the factor from each gap to the next gap, which is farther from the anchor.
     pub growth: u8,
     /// Target SIRs: the bits of each f32, hexadecimal.
     pub targets: Vec<String>,
@@ -102,7 +102,7 @@ impl Vectors {
     /// Reads the built-in test vectors.
     ///
     /// # Errors
-    /// The file does not have this format; a test excludes this.
+    /// The file does not have this format. A test excludes this.
     pub fn load() -> Result<Self, serde_json::Error> {
         serde_json::from_str(FILE)
     }

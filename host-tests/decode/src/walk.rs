@@ -67,7 +67,9 @@ pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Field
     }
 }
 
-/// Decodes the fields `fields` from `body`. The second result is an error text if bytes are missing or left over.
+/// Decodes the fields `fields` from `body`.
+///
+/// The second result is an error text if bytes are missing, or are left over after the last field.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();

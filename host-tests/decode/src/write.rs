@@ -7,7 +7,7 @@ use crate::value::{Fields, Value};
 
 /// Encodes the body of the message `name`. `fields` has the values as `cargo decode --json` prints them.
 ///
-/// Digests and flags may also be numbers.
+/// The values of digests and flags may also be given as numbers.
 ///
 /// # Errors
 /// Names the field whose value is missing or does not fit its type.
@@ -21,7 +21,7 @@ pub fn write(format: &Format, name: &str, fields: &Json) -> Result<Vec<u8>, Stri
     Ok(body)
 }
 
-/// Appends the bytes of all fields to `body`, valid or not.
+/// Appends the encoding of all fields to `body`, even of fields that are out of range.
 pub fn write_fields(fields: &Fields<'_>, body: &mut Vec<u8>) {
     for (field, value) in &fields.0 {
         one(&field.kind, value, body);

@@ -12,7 +12,7 @@ use uav_relay::{
     Port, Profile, Relay, Settings, Wiring,
 };
 
-/// Returns the paper's multi-hop mission: 1 km, and an interferer of 80 W beside its middle.
+/// Returns the paper's multi-hop mission: 1 km, and an interferer of 80 W, 400 m beside the middle.
 ///
 /// # Panics
 /// Never: its numbers are in range.
@@ -46,7 +46,7 @@ pub fn paper(relays: u16) -> Mission {
 
 const FLIGHT: Duration = Duration::from_millis(2);
 
-/// Radio range on a shared channel: number of relays in each direction that receive a frame.
+/// Radio range on a shared channel: number of relays that a frame reaches in each direction.
 const RANGE: usize = 4;
 
 struct Arrival {
@@ -100,7 +100,7 @@ impl Chain {
         &self.relays
     }
 
-    /// Returns the relays, mutable, to call the functions that a firmware calls.
+    /// Returns the relays, mutable, so that their functions can be called as a firmware calls them.
     pub fn relays_mut(&mut self) -> &mut [Relay] {
         &mut self.relays
     }
@@ -186,7 +186,7 @@ impl Chain {
 
 /// Returns the index, from 0, and the port of each relay that receives a frame.
 ///
-/// Relay `index` (from 0) of `count` sends it on `port`.
+/// The frame is sent on `port` by relay `index` (from 0) of `count` relays.
 fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     let next = |at: usize, port| (at < count).then_some((at, port));
     match port {

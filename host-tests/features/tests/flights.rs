@@ -22,7 +22,7 @@ const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 
 /// Expected CRC-32C of all sent bytes, with relays connected by wires.
 ///
-/// Only the feature `departures` changes a byte: each lease renewal has a flag that all relays are in place.
+/// Only the feature `departures` changes the bytes: it sets a flag in each lease renewal when all relays are in place.
 const SAID_BY_WIRES: u32 = if cfg!(feature = "departures") {
     0x7b9b_6625
 } else {
@@ -52,7 +52,7 @@ fn bits(places: &[f32]) -> Vec<u32> {
     places.iter().map(|x_m| x_m.to_bits()).collect()
 }
 
-/// Returns the SIR of every hop, linear, in f64 by the paper's formulas.
+/// Returns the SIR (linear) of every hop, computed in f64 by the paper's formulas.
 ///
 /// `places` are the relays' x, m. Excess losses: 0.1 dB to and from drones, 21 dB from the interferer to the
 /// receiver.

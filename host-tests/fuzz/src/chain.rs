@@ -17,7 +17,7 @@ const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
 
-/// Maximum number of frames in transit to one relay. One more frame replaces the oldest.
+/// Maximum number of frames in transit to one relay. A frame beyond this number replaces the oldest one.
 const MAX_IN_TRANSIT: usize = 24;
 
 /// Maximum number of rounds in one operation. In a round each relay receives one frame.
@@ -31,7 +31,7 @@ const ROUNDING: f64 = 1.3e-7;
 /// Fuzz target. Reads `data` as a mission, the relays' settings, and operations on the frames between relays.
 ///
 /// # Panics
-/// A relay breaks a rule that the module `watch` checks. Or two neighbours are too close to each other, although their
+/// A relay breaks a rule that the module `watch` checks. Or two neighbours are too close to each other, although both
 /// positions come from the same pass (a message along the chain and back). Or the chain does not agree after the faults
 /// have ended.
 pub fn chain(data: &[u8]) {
@@ -43,7 +43,7 @@ pub fn chain(data: &[u8]) {
 /// `None` if the mission or the settings are refused.
 ///
 /// # Panics
-/// Those of [`chain()`].
+/// The panics of the fuzz target [`chain()`].
 pub fn flown(data: &[u8]) -> Option<Vec<Watched>> {
     let mut input = Input::new(data);
     let mut chain = Chain::new(&mut input)?;
@@ -299,7 +299,9 @@ impl Chain {
         }
     }
 
-    /// Takes the frames that relay `at` sends, and checks the relay's view and separation.
+    /// Takes the frames that relay `at` sends, and puts them in transit. Then checks the relay.
+    ///
+    /// The checks are those of its view (membership of the chain) and of its separation from each neighbour.
     fn settle(&mut self, at: usize) {
         let now = self.now;
         let Some(member) = self.members.get_mut(at) else {
@@ -333,7 +335,7 @@ impl Chain {
 
     /// Checks the index of relay `at` in its view (membership of the chain), and the view's size.
     ///
-    /// On neither side of the relay may the view have more relays than the mission.
+    /// The view must not have more relays than the mission before relay `at`, nor after it.
     fn check_place(&self, at: usize) {
         if let Some(member) = self.members.get(at) {
             let relay = member.watched.relay();
@@ -347,7 +349,7 @@ impl Chain {
         }
     }
 
-    /// Checks the separation of relay `at` (from 0) from the previous relay.
+    /// Checks that relay `at` (from 0) keeps the minimum separation from relay `at` - 1.
     ///
     /// The check applies only if both positions come from the same pass (a message along the chain and back).
     fn check_separation(&self, at: usize) {

@@ -2,10 +2,10 @@
 
 use uav_relay::Stats;
 
-/// Returns the number of received frames with a valid CRC. Each such frame is in exactly one of the summed counters.
+/// Returns the number of received frames with a valid CRC, computed as a sum of counters.
 ///
-/// `key` is true if the relay has a signing key. It then counts unsigned frames in `unsigned`; without a key they are
-/// accepted.
+/// Each such frame is counted in exactly one of these counters. `key` is true if the relay has a signing key. Only with
+/// a key it counts unsigned frames in `unsigned`; without a key it accepts them.
 pub const fn intact(stats: &Stats, key: bool) -> u32 {
     let unsigned = if key { stats.unsigned } else { 0 };
     stats.received

@@ -15,7 +15,7 @@ use super::setting;
 ///
 /// # Panics
 /// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it
-/// has received. Or the two relays differ afterwards.
+/// has received. Or the states of the two relays differ after the stream.
 pub fn deframe(data: &[u8]) {
     let mut input = Input::new(data);
     let lengths = input.word();
@@ -52,7 +52,7 @@ fn frames_by_definition(stream: &[u8]) {
     }
 }
 
-/// Checks that a relay handles a stream in the same way in one piece and in many.
+/// Checks that a relay handles a stream in the same way in one piece and in many pieces.
 ///
 /// The pieces have two alternating lengths of 1 to 256 bytes.
 fn cut(stream: &[u8], lengths: u16) {

@@ -21,7 +21,7 @@ use super::watch::NETWORK;
 
 const CHECK: usize = 4;
 
-/// Input byte for which `setting::of_chain` selects signed frames.
+/// Input byte with which `setting::of_chain` returns settings with signed frames.
 const SIGNS: u8 = 8;
 
 /// Fuzz target. Reads `data` as header and body of a frame, adds CRC and COBS, and decodes it.
@@ -62,7 +62,7 @@ pub fn frame(data: &[u8]) {
     assert_eq!(written.iter().position(|&byte| byte == 0), Some(len - 1));
 }
 
-/// Checks that `frame::open` returns the parts of an intact frame that the format defines.
+/// Checks that `frame::open` splits an intact frame into the parts defined by the format.
 fn check_decoded(plain: &[u8]) {
     let opened = frame::open(plain);
     let (Some(checked), Some(&[_, first, _, second])) = (
@@ -91,7 +91,7 @@ fn check_decoded(plain: &[u8]) {
     assert_eq!(opened.handshake, flags == 3);
 }
 
-/// Checks that a relay which requires authentication tags verifies them.
+/// Checks that a relay that requires authentication tags verifies the tags.
 ///
 /// A frame with the body of `plain`, valid addresses and a valid tag must be accepted, but only once. With a flipped
 /// bit, the frame must be counted as forged.

@@ -57,7 +57,7 @@ impl<'a> Input<'a> {
         self.byte() % count.max(1)
     }
 
-    /// Reads a byte as a length, and then as many bytes.
+    /// Reads one byte as a length, and returns as many of the following bytes, at most all of the rest.
     pub fn piece(&mut self) -> &'a [u8] {
         let len = usize::from(self.byte()).min(self.rest.len());
         let (piece, rest) = self.rest.split_at_checked(len).unwrap_or((self.rest, &[]));
@@ -83,7 +83,7 @@ impl<'a> Input<'a> {
         narrow(f64::from(low) * ratio.powf(part)).clamp(low, high)
     }
 
-    /// Reads any f32 in one case of sixteen; otherwise returns the result of `usual`.
+    /// Reads any f32 with a probability of 1/16; otherwise returns the result of `usual`.
     pub fn mostly(&mut self, usual: impl FnOnce(&mut Self) -> f32) -> f32 {
         if self.byte() % 16 == 15 {
             self.any_number()

@@ -38,7 +38,7 @@ pub use mavlink::mavlink;
 pub use relay::relay;
 pub use scenario::scenario;
 
-/// Fuzz target: name, also of its corpus (collection of inputs), and function.
+/// Fuzz target: its name, which is also that of its corpus (collection of inputs), and its function.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// List of all fuzz targets.

@@ -13,12 +13,13 @@ use super::input::Input;
 use reference::Reference;
 use wire::{Placed, stream};
 
-/// Fuzz target. Reads `data` as a stream of MAVLink frames, intact or damaged, or as operations on an autopilot link.
+/// Fuzz target. Reads `data` as operations on an autopilot link, or as a stream of intact and damaged MAVLink frames.
 ///
 /// # Panics
 /// - The parser deviates from the definition of frames, misses an intact frame, or exceeds its bound on work.
 /// - The link sends numbers that are not finite, targets far from the line, or targets that its state does not permit.
-/// - The results of the link depend on how its bytes are split, or it allocates memory or requests needless calls.
+/// - The results of the link depend on how the received bytes are split, or the link allocates memory, or it requests
+///   needless calls.
 /// - A link with a key accepts unsigned or repeated frames, rejects other frames, or does not sign its frames with
 ///   rising timestamps.
 pub fn mavlink(data: &[u8]) {

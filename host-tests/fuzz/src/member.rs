@@ -27,7 +27,7 @@ const HANDSHAKE_BODY: usize = 2 * NONCE + 1;
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Member {
     key: [u8; 32],
-    /// Nonce of the neighbour. The nonce rises at every start.
+    /// Nonce of this neighbour. It is larger after each restart.
     own: Vec<u8>,
     relay: Vec<u8>,
     counter: u32,
@@ -104,7 +104,9 @@ impl Member {
         sealed(plain)
     }
 
-    /// Returns the tag of a frame: keyed BLAKE2s over both nonces and the signed bytes, cut to 8 bytes.
+    /// Returns the tag of a frame: keyed BLAKE2s over both nodes' nonces and `signed`, cut to 8 bytes.
+    ///
+    /// `signed` has the signed bytes, which are header and body of the frame.
     fn tag(&self, to: &[u8], signed: &[u8]) -> [u8; 8] {
         let Ok(mut mac) = Blake2sMac::<U8>::new_from_slice(&self.key) else {
             unreachable!("a key of 32 bytes");

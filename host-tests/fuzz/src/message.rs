@@ -15,7 +15,7 @@ pub use parts::RelayState;
 
 /// Builds a message body of one of the kinds 0 to 22 except 20, or of arbitrary bytes.
 ///
-/// Some fields have values near those in `state`, so that the tested relay often accepts the message.
+/// Some fields have values near those of the tested relay in `state`, so that this relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     let tag = match input.below(16) {
         15 => 15 + input.below(6),
@@ -64,8 +64,8 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
 
 /// Additional field of a sweep message: none, Upsilon = E[1 / interference], or the lateral position.
 ///
-/// The field follows the sender's power. After the field comes, for each target SIR, the farthest position of the
-/// sender with that SIR.
+/// In the message the field comes after the sender's power, and before the list of the farthest positions of the
+/// sender, one for each target SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,
@@ -166,6 +166,8 @@ impl Body<'_, '_> {
     }
 
     /// Appends the first fields of a Proposal or Decision: mission, view, and a relay's index in the view.
+    ///
+    /// A view is a membership of the chain.
     fn call(&mut self) {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);

@@ -34,9 +34,9 @@ fn results_contain_the_stored_run() {
 
 /// Checks in the stored run that SLSQP takes at least 20 times as long as this crate.
 ///
-/// SLSQP has a single start: of the equally spaced chains the one that reaches this crate's SIR soonest. The problems
-/// have eight and fifty relays with free altitudes. Lateral offsets are not checked: there this crate tries more than
-/// twice as many starts.
+/// SLSQP starts from a single chain: the equally spaced chain from which it reaches this crate's SIR soonest. The
+/// problems have eight and fifty relays with free altitudes. Problems with lateral offsets are not checked, because
+/// this crate tries more than twice as many starts for them.
 #[test]
 fn slsqp_from_one_start_takes_20_times_our_time() {
     let kept = include_str!("../../rivals/measured.json");

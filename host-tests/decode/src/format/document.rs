@@ -57,7 +57,7 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
 
 /// Replaces each row such as `as bytes 1 to 18 of a Sweep` with the rows of that message's table.
 ///
-/// `known` has the tables of the messages before this one.
+/// `known` has the tables of the messages that come before the message of `rows`.
 fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in rows {

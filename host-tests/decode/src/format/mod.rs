@@ -28,7 +28,7 @@ pub enum Kind {
     Bool,
     /// Digest (u16) of a mission, of a view, or of the line between the Tx and Rx positions.
     Digest,
-    /// Name of a view (membership of the chain), u32: number and proposer.
+    /// Name of a view (membership of the chain), u32: the view's number and its proposer's node number.
     View,
     /// Flags in one byte, with their names, lowest bit first.
     Flags(Vec<String>),
@@ -38,7 +38,7 @@ pub enum Kind {
     Array(usize, Box<Kind>),
     /// Optional item: byte 00 for none, or byte 01 and the item.
     Option(Box<Kind>),
-    /// List of items of one type: a varint count, at most the number in this variant, and the items.
+    /// List of items of one type: a varint count, then the items. The number in this variant is the maximum count.
     List(u64, Box<Kind>),
     /// Group of consecutive fields.
     Group(Vec<Field>),
@@ -73,7 +73,7 @@ pub struct Field {
     pub range: String,
 }
 
-/// Layout of a message's body after its first byte, the tag.
+/// Layout of a message's body after its first byte, the message tag (kind of message).
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Layout {
     /// Name of the message.
@@ -95,7 +95,7 @@ impl Format {
     /// Reads the layouts from the tables of `FORMAT.md`.
     ///
     /// # Errors
-    /// Names the row that cannot be parsed; tests exclude this.
+    /// Names the row that cannot be parsed. Tests exclude that there is such a row.
     pub fn load() -> Result<Self, String> {
         document::read(DOCUMENT)
     }

@@ -131,9 +131,10 @@ fn pieces<E>(
     }
 }
 
-/// Converts a packet's timestamp to the time since 1970. `resolution` is that of its interface.
+/// Converts the timestamp `read` of a packet to the time since 1970.
 ///
-/// The capture library, which returns `read`, ignores the resolution: it assumes nanoseconds.
+/// `resolution` is that of the packet's interface. The capture library, which returns `read`, ignores the resolution:
+/// it assumes nanoseconds.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

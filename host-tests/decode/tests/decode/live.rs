@@ -5,7 +5,7 @@ use std::process::Stdio;
 
 use super::{HEARTBEAT, decode, lines};
 
-/// Checks that each frame is printed at once. With a buffer the test would time out.
+/// Checks that each frame is printed at once. If the output were buffered, the test would time out.
 #[test]
 fn each_frame_is_printed_at_once() {
     let mut child = decode().arg("--json").spawn().unwrap();

@@ -42,7 +42,7 @@ fn lines(arguments: &[&str], input: &[u8]) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Runs the program; checks exit status 2; returns its line on standard error.
+/// Runs the program, checks that its exit status is 2, and returns its only line on standard error.
 fn refusal(arguments: &[&str], input: &[u8]) -> String {
     let output = piped(arguments, input);
     let text = String::from_utf8(output.stderr).unwrap();

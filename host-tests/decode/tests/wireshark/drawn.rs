@@ -8,7 +8,9 @@ use uav_relay_decode::envelope::{before, sealed, stuffed};
 use uav_relay_decode::format::Format;
 use uav_relay_decode::write::write_fields;
 
-/// Returns a random frame with the message tag `kind`. If `kind` equals the number of tags, it is a handshake.
+/// Returns a random frame with the message tag `kind`.
+///
+/// If `kind` equals the number of message tags, the frame is a handshake.
 pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let (layout, flags, mut body) = match format.messages.get(kind) {
         Some(message) => (
@@ -26,7 +28,7 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
 
 /// Returns a frame with this body and a random header with the flags `flags`.
 ///
-/// With flags 0 the frame has no authentication tag, otherwise a random one.
+/// If `flags` is 0, the frame has no authentication tag, otherwise a random tag.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let header = Header {
         network: rng.random(),

@@ -122,7 +122,9 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 impl Wanted<'_> {
-    /// Asserts that Wireshark shows this field. Where Wireshark rounds to six digits, the bytes are compared.
+    /// Asserts that Wireshark shows this field.
+    ///
+    /// The bytes of floating-point numbers are compared, too, because Wireshark rounds their text to six digits.
     pub(crate) fn is(&self, shown: &Shown) {
         assert_eq!(shown.name, self.name);
         let show = shown.show.as_str();

@@ -6,15 +6,15 @@ use super::{Chain, Member};
 
 /// Maximum number of rounds until all relays agree. In a round each relay receives one frame.
 ///
-/// In the slowest agreement, the relays at first do not use repeatedly lost links for some minutes of virtual time.
-/// Then 24 passes go along 4 relays.
+/// In the slowest agreement, the relays at first avoid links that were lost repeatedly, for some minutes of virtual
+/// time. Then 24 passes (messages along the chain and back) go along 4 relays.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
     /// Runs the chain without faults until all relays agree in one view (membership of the chain).
     ///
     /// Panics if the agreement takes more than [`PATIENCE`] rounds. Returns at once if the leader finds that no target
-    /// SIR can be met. Does nothing if a relay lowers the target in fixed steps, which takes too long.
+    /// SIR can be met. Does nothing if a relay's schedule lowers the target SIR in fixed steps, which takes too long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {
@@ -62,7 +62,10 @@ fn phase(member: &Member) -> Phase {
     member.watched.relay().phase()
 }
 
-/// Returns a relay's state for a failure message: phase, view, index, number of relays, neighbours.
+/// Returns a relay's state for a failure message.
+///
+/// It has the phase, the view (membership of the chain), the index and number of relays in the view, and the
+/// neighbours.
 fn state(member: &Member) -> (Phase, ViewId, u16, u16, [Option<u16>; 2]) {
     let relay = member.watched.relay();
     let left = relay.mission().relays();

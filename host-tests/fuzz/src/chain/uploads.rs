@@ -19,7 +19,7 @@ const SITES: Option<Sites> = Some(Sites {
 });
 
 impl Chain {
-    /// Uploads a mission with a changed interferer to relay `at`. Its version is newer than all before.
+    /// Uploads a mission with a changed interferer to relay `at`. Its version is larger than all earlier versions.
     pub(super) fn upload(&mut self, at: usize, input: &mut Input<'_>) {
         let config = *self.mission.config();
         let Some(interferer) = self.mission.interferer() else {

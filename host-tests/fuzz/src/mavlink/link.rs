@@ -19,15 +19,15 @@ use crate::input::Input;
 
 const MAX_OPERATIONS: usize = 256;
 
-/// Maximum number of frames that the link may send per cycle. With more it seems never to stop.
+/// Maximum number of frames that the link may send per cycle. A link that sends more seems never to stop.
 ///
-/// It is twice 13: heartbeat, three message requests, command answer, flight target, three status texts and four named
-/// values. A clock request (TIMESYNC) can come in addition.
+/// The limit is twice the sum 13 of these frames: heartbeat, three message requests, command answer, flight target,
+/// three status texts and four named values. A clock request (TIMESYNC) can come in addition.
 const MAX_FRAMES: usize = 26;
 
 /// Maximum distance of a flight target from the line Tx-Rx, m.
 ///
-/// The link permits 5 km. The test computes the distance on a flat earth, so it adds 40 m.
+/// The link permits 5 km. The limit has 40 m more, because the test computes the distance on a flat earth.
 const AROUND_M: f64 = 5_040.0;
 
 /// Position of Tx: latitude and longitude, degrees; height above the sea, m.
@@ -256,7 +256,7 @@ impl Link {
         self.deliver_frame(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
-    /// Reports a lost relay to the link, then delivers the operator's command that lost relays have landed.
+    /// Reports a lost relay to the link, then delivers an operator's command that names relays as landed.
     fn clear_lost_relay(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {
@@ -388,7 +388,7 @@ impl Link {
         }
     }
 
-    /// Checks a flight target: finite, near the line, within the speed limit, and permitted now.
+    /// Checks a flight target: finite, near the line, within the speed limit, and permitted in this state.
     fn check_target(&mut self, payload: &[u8]) {
         let state = self.autopilot.state();
         let may = matches!(state, State::Engaged | State::Blind)

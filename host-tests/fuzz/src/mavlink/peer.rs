@@ -38,10 +38,10 @@ pub(super) struct Peer {
     stamp: u64,
     /// Newest signed frames of the autopilot, for replays.
     history: Vec<Vec<u8>>,
-    /// Expected clock of the tested link at the time `at`, in units of 10 µs since 2015-01-01.
+    /// Clock that the tested link should have at the time `at`, in units of 10 µs since 2015-01-01.
     time: u64,
     at: Instant,
-    /// Senders that the tested link should remember.
+    /// Senders, with timestamps, that the tested link should remember.
     senders: Vec<Sender>,
     /// Timestamp of the last frame that the tested link sent.
     sent: u64,
@@ -76,10 +76,10 @@ impl Peer {
         (peer, Signing::new(KEY, 3, stamp, now))
     }
 
-    /// Signs a frame of the autopilot, mostly correctly.
+    /// Signs a frame of the autopilot, in most cases correctly.
     ///
-    /// Otherwise the frame stays unsigned, has a wrong key or an old timestamp, is damaged, or is replaced by an
-    /// earlier frame.
+    /// In the other cases the frame stays unsigned, has a wrong key or an old timestamp, is damaged, or is replaced by
+    /// an earlier frame.
     pub(super) fn sign_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();
         let (key, link) = match how {
@@ -124,7 +124,7 @@ impl Peer {
 
     /// Sets the autopilot's clock to a different time.
     ///
-    /// It is a day earlier or later, near the tested link's time, or the largest timestamp.
+    /// The new time is a day earlier or later, near the time of the tested link, or the largest timestamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
         const DAY: u64 = 8_640_000_000;
         self.stamp = match input.below(6) {
@@ -202,7 +202,7 @@ impl Peer {
         self.at = self.at + uav_relay::Duration::from_micros(10 * passed);
     }
 
-    /// Checks the signature of a frame sent by the tested link at `now`; returns it without the signature.
+    /// Checks the signature of a frame sent by the tested link at `now`. Returns the frame without the signature.
     ///
     /// # Panics
     /// The signature is wrong.

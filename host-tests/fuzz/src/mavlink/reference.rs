@@ -16,7 +16,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reference {
     pub(super) frames: Vec<Frame>,
-    /// Number of invalid frames with the header of a known message.
+    /// Number of invalid frames whose header is that of a known message.
     pub(super) broken: usize,
     pub(super) checksums: usize,
 }

@@ -11,7 +11,7 @@ pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
     })
 }
 
-/// Kind of a MAVLink message: number, extra byte of its checksum, payload length.
+/// Kind of a MAVLink message: its number, the CRC_EXTRA byte of its checksum, and its payload length.
 pub(super) type Kind = (u32, u8, usize);
 
 pub(super) const HEARTBEAT: Kind = (0, 50, 9);
@@ -32,7 +32,7 @@ pub(super) fn id(frame: &[u8]) -> u32 {
     u32::from_le_bytes([a, b, c, 0])
 }
 
-/// Returns the extra byte in a message's checksum; 0 for an unknown message.
+/// Returns the CRC_EXTRA byte of a message's checksum; 0 for an unknown message.
 pub(super) fn extra(id: u32) -> u8 {
     let known = [
         HEARTBEAT,
@@ -83,7 +83,7 @@ pub(super) struct Placed {
     pub(super) at: usize,
 }
 
-/// Maximum number of frames and noise pieces in a stream, which the test parses twice.
+/// Maximum number of parts (frames and pieces of noise) of a stream. The test parses each stream twice.
 const MAX_PARTS: usize = 64;
 
 /// Builds a stream of noise and of intact, damaged and truncated frames.

@@ -3,7 +3,7 @@
 use super::parts::Body;
 use crate::input::Input;
 
-/// Number of sums of measurements in a sensing message.
+/// Number of sums over all measurements in a sensing message.
 const SUMS: usize = 18;
 
 impl Body<'_, '_> {
@@ -39,7 +39,7 @@ impl Body<'_, '_> {
         self.float(|input| input.scaled(1e-30, 1e6));
     }
 
-    /// Appends the interference power measured at Tx or Rx, W; 0 for none.
+    /// Appends the interference power measured at Tx or Rx, W; 0 if none was measured.
     fn level_or_none(&mut self) {
         if self.input.flag() {
             self.float(|input| input.scaled(1e-30, 1e6));
@@ -49,7 +49,7 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the sums of a sensing message, for random measurements at up to eight positions.
+/// Returns the sums over random measurements at up to eight positions, as in a sensing message.
 ///
 /// `input` decides if the powers are those of one interferer, or arbitrary.
 fn of_places(input: &mut Input<'_>) -> [f32; SUMS] {

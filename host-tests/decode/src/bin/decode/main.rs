@@ -58,7 +58,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Returns the signing key at the end of the capture's comment, if any. A simulation writes it there.
+/// Returns the signing key at the end of the capture's comment, if any. A simulation writes the key there.
 fn of_comment(comment: &str) -> Option<[u8; 32]> {
     let (_, digits) = comment.rsplit_once(", key ")?;
     key::parse(digits).ok()
