@@ -25,7 +25,7 @@ const MOST_STEPS: u32 = 400_000;
 /// Frame in transit between two nodes of the test bench.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time at which the frame arrives at the node.
+    /// Time at which the frame arrives at the receiving node.
     pub at: Instant,
     /// Sending node: 0 is the transmitter, then come the relays, and last the receiver.
     pub from: usize,
@@ -49,7 +49,7 @@ impl Frame {
 
 /// Function that chooses the receiving port of a frame; `None` if the frame does not arrive.
 ///
-/// It takes the sender's index, its port, and the receiver's index; indices are from 1.
+/// It takes the sender's index, the sender's port, and the receiver's index; indices are from 1.
 pub type Route = Box<dyn Fn(usize, Port, usize) -> Option<Port>>;
 
 /// Function that may change an arriving frame. It returns true if the frame is delivered.
@@ -68,7 +68,7 @@ pub struct Bench {
     places: Vec<usize>,
     pub now: Instant,
     pub flying: VecDeque<Frame>,
-    /// Events of the relays, each with the relay's position in `relays`, from 0.
+    /// Events of the relays. The number before an event is the relay's position in the field `relays`, from 0.
     pub events: Vec<(usize, Event)>,
     pub latency: Duration,
     pub route: Route,
@@ -77,7 +77,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Creates a test bench with `relays`. Frames reach the neighbours without delay.
+    /// Creates a test bench with `relays`. Frames pass only between neighbours, and without delay.
     pub fn new(relays: Vec<Relay>, now: Instant) -> Self {
         let places = relays.iter().map(|relay| usize::from(relay.index()));
         let mut bench = Self {
@@ -96,7 +96,7 @@ impl Bench {
         bench
     }
 
-    /// Creates a test bench with all relays of `mission`. `settings` returns the settings of a relay by its index.
+    /// Creates a test bench with all relays of `mission`. `settings` returns a relay's settings for its index.
     ///
     /// The random seed of a relay is its index.
     ///
@@ -123,7 +123,7 @@ impl Bench {
 
     /// Returns the ground station at `end`; the first call creates it.
     ///
-    /// `base` is its mission loaded before flight; `auth` authenticates its frames.
+    /// `base` is the mission that the station has before flight; `auth` authenticates the station's frames.
     pub fn ground(&mut self, base: &Mission, end: Side, auth: Auth) -> &mut Ground {
         let ground = || Box::new(Ground::new(base, end, NETWORK, Wiring::Pair, auth));
         self.grounds[end as usize].get_or_insert_with(ground)
@@ -259,9 +259,9 @@ impl Bench {
     }
 }
 
-/// Routes frames to neighbours only: by wires, or by a radio with a range of one relay.
+/// Routes frames to neighbours only: by wires, or by a radio channel that reaches only neighbours.
 ///
-/// Returns the receiver's port; `None` if `to` is not a neighbour of `from` at that port.
+/// Returns the receiver's port; `None` if `to` is not the neighbour that `from` reaches through `port`.
 pub fn between_neighbours(from: usize, port: Port, to: usize) -> Option<Port> {
     match port {
         Port::Shared => (from.abs_diff(to) == 1).then_some(port),

@@ -44,8 +44,8 @@ pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
 
 /// Returns the stored votes of a relay that has agreed on view `number`, proposed by relay 1.
 ///
-/// The view (membership of the chain) has `relays` relays; `member` is true if this relay is one of them. `base` is
-/// the digest of the mission loaded before flight.
+/// The view (membership of the chain) has `relays` relays; `member` is true if the voting relay is one of them. `base`
+/// is the digest of the mission loaded before flight.
 ///
 /// # Panics
 /// No relay can have such a record.

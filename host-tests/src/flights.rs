@@ -32,7 +32,7 @@ pub fn end_at(setup: &mut Setup, at: Instant) {
     setup.deadline = at;
 }
 
-/// Runs `setup` and checks that all relays end with agreed positions for one target SIR.
+/// Runs `setup`. Checks that all relays end with agreed positions for the same target SIR.
 ///
 /// # Panics
 /// The chain does not settle, or a setpoint was outside its limits.
@@ -45,8 +45,8 @@ pub fn settle(setup: Setup) -> Outcome {
 
 /// Runs `setup` without faults and with [`Faults::BAD_DAY`], and checks that both runs end alike.
 ///
-/// The kind of ending and the bits of the positions must be the same. Returns the run with faults, with random
-/// numbers from `seed`.
+/// Both runs must have the same [`Ending`] and bit-identical positions. Returns the run with faults; its random numbers
+/// come from `seed`.
 ///
 /// # Panics
 /// The runs differ, a setpoint was outside its limits, or a round of Algorithm 2 has lowered the chain's SIR.
@@ -86,7 +86,7 @@ pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
 
 /// Returns eight drones that start in a row at least `gap_m` apart, with random speeds.
 ///
-/// Their reported positions have no errors.
+/// The drones report their exact positions.
 pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     let start = in_a_row(rng, gap_m);
     let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
@@ -98,7 +98,7 @@ pub const SEPARATION_M: f32 = 5.0;
 
 /// Smallest distance of two drones that the tests permit, m.
 ///
-/// It is 2 mm less than the separation, because of the rounding of f32 positions up to 1 km.
+/// It is 2 mm less than the separation, which allows for the rounding of f32 positions up to 1 km.
 pub const APART_M: f64 = SEPARATION_M as f64 - 2e-3;
 
 /// Adds a collision guard to `setup`, and eight drones that start at least the separation apart.
@@ -135,7 +135,9 @@ pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     }
 }
 
-/// Returns `config` as a mission with the altitude and lateral ranges of `corridor`, if valid.
+/// Returns the mission of `config` with the altitude and lateral ranges of `corridor`.
+///
+/// Returns `None` if this mission is not valid.
 pub fn with_room(config: &MissionConfig, corridor: Corridor) -> Option<Mission> {
     let config = MissionConfig {
         band: Band {

@@ -12,7 +12,7 @@ use uav_relay_sim::simulator::setup::Setup;
 /// It is twenty times `dead_after`, the silence after which a relay counts as lost.
 pub const RECOVERY: Duration = Duration::from_millis(300_000);
 
-/// Returns the environment variable `name` as a number; `usual` if it is not set.
+/// Returns the environment variable `name` as a number; `usual` if the variable is not set.
 ///
 /// # Panics
 /// The variable is not a number.
@@ -20,10 +20,10 @@ pub fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// Adds losses of up to three random relays to `setup`. `at` returns the time of each loss, ms.
+/// Adds losses of up to three random relays to the schedule of `setup`.
 ///
-/// A lost relay returns with probability one half, or always if `all_return` is true. The run may last until
-/// [`RECOVERY`] after the last event.
+/// `at` returns the time of each loss, ms. A lost relay returns with probability one half, or always if `all_return` is
+/// true. The run may last until [`RECOVERY`] after the last event.
 pub fn lose_relays(
     setup: &mut Setup,
     rng: &mut ChaCha8Rng,
@@ -47,7 +47,7 @@ pub fn lose_relays(
     setup.deadline = last.unwrap_or(Instant::ZERO) + RECOVERY;
 }
 
-/// Runs `count` random schedules with seeds from `first` on, and prints their recovery times.
+/// Runs `count` random schedules and prints their recovery times. The seeds are `first` and the following numbers.
 ///
 /// # Panics
 /// `judge` has found a fault in one of the runs.
@@ -95,7 +95,7 @@ pub fn left(outcome: &Outcome) -> Vec<u16> {
     living.map(|(index, _)| index).collect()
 }
 
-/// Runs a chain of only the surviving relays `left` of `setup`, without faults; returns its result.
+/// Runs a chain of only the relays `left`, the survivors of `setup`, without faults. Returns its result.
 ///
 /// `config` is the chain's mission.
 ///
@@ -119,9 +119,10 @@ pub fn undisturbed(setup: &Setup, left: &[u16], config: MissionConfig) -> Outcom
     outcome
 }
 
-/// Checks that the surviving relays `left` end as a chain of only these relays without faults.
+/// Checks that the surviving relays `left` have the same result as a chain of only these relays.
 ///
-/// Setpoints and target SIR must be bit-identical. `version` and `config` are those of the final mission.
+/// Setpoints and target SIR must equal those of that chain without faults to the bit. `version` and `config` are those
+/// of the final mission.
 ///
 /// # Errors
 /// The first difference, a relay with another mission version, or setpoints outside their limits.

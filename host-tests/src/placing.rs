@@ -59,9 +59,9 @@ pub fn reference(at: Placement) -> Place {
     }
 }
 
-/// Compares the SIRs of the hops of 4 000 random chains with the reference, to 1e-6 relative.
+/// Compares the hops' SIRs of 4 000 random chains with the f64 reference: at most 1e-6 relative error.
 ///
-/// `draw` draws a chain. This function then draws its relays' x, in ascending order.
+/// `draw` draws a chain. `hop_sirs_agree` then draws the x of the chain's relays, in ascending order.
 pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Link) {
     let mut worst = 0.0_f64;
     for _ in 0..4_000 {
@@ -93,22 +93,21 @@ pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Li
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// Solution of a chain by the crate, compared with the reference optimum.
+/// Solution that the crate finds for a chain, compared with the reference optimum.
 #[derive(Debug)]
 pub struct Solved {
     /// Distances of the relays from Tx along the line to Rx, m.
     pub x: Vec<f64>,
-    /// Relative difference of the SIR from the reference optimum: 1 - SIR / optimum.
+    /// Relative shortfall of the SIR from the reference optimum: 1 - SIR / optimum.
     pub short: f64,
     /// Number of sweeps (messages along the chain) for the solution.
     pub sweeps: u32,
 }
 
-/// Checks that the crate's solution is at most `allowed` (relative) below the optimum, and never above.
+/// Checks that the crate's SIR is at most `allowed` (relative) below the optimum, and never above.
 ///
-/// All relays of the chain `link` must have the same altitude. Then the crate finds the optimum, because each relay
-/// goes as far as the target SIR permits. Without any chain of an SIR above 0 the crate must find no solution; then
-/// `None` is returned.
+/// The relays of `link` must have equal altitudes; then the crate finds the optimum, since each relay goes as far as
+/// the target SIR permits. If no chain has an SIR above 0, the crate must find no solution, and `None` is returned.
 pub fn optimum_is_found(
     link: &Link,
     (mission, own): &(Mission, Vec<(u16, Profile)>),
@@ -137,7 +136,7 @@ pub fn optimum_is_found(
 /// Results for chains whose relays differ in power and altitude.
 #[derive(Debug, Default)]
 pub struct Mixed {
-    /// Number of chains with an agreement.
+    /// Number of chains for which the relays agree on a target SIR.
     pub solved: u32,
     /// Number of chains with an SIR at most 2e-4 (relative) below the reference optimum.
     pub best: u32,
@@ -148,7 +147,7 @@ pub struct Mixed {
 impl Mixed {
     /// Solves a chain of different relays, and counts the result.
     ///
-    /// Its SIR must be at least the agreed target, and at most the optimum.
+    /// The SIR of the solved chain must be at least the agreed target SIR, and at most the optimum.
     pub fn meet_what_they_agree_on(&mut self, link: &Link) {
         let Some((mission, own)) = of_link(link, 1e-4) else {
             return;
@@ -180,13 +179,13 @@ impl Mixed {
 pub struct DrawnHop {
     /// Random chain of 1 to 4 relays with the tested hop. Its numbers are rounded to f32, as in relays.
     pub link: Link,
-    /// Tested hop in the crate; the reference computes it from `link`.
+    /// Tested hop as the crate represents it. The reference model computes the same hop from `link`.
     pub hop: Hop,
     /// Index of the receiving relay, from 1.
     pub index: u16,
     /// Distance of the sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// SIR of the hop without noise, linear, if sender and interferer are equally far from the receiver.
+    /// Linear SIR of the hop without noise at equal distances of sender and interferer from the receiver.
     pub gain: f64,
     relays: u16,
 }
@@ -229,20 +228,20 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
 /// Results for the farthest x of a receiver that meets a target SIR, compared with the reference.
 #[derive(Debug, Default)]
 pub struct Reaches {
-    /// Number of hops whose farthest x is limited by the target SIR, and not by Rx.
+    /// Number of hops whose farthest x is limited by the target SIR. Other hops are limited by the position of Rx.
     pub inside: u32,
     /// Number of hops that meet the target SIR at their farthest x, but not at some smaller x.
     ///
-    /// The interferer is between these positions.
+    /// The interferer is between that smaller x and the farthest x.
     pub leaps: u32,
     /// Number of hops that meet their target SIR nowhere.
     pub infeasible: u32,
 }
 
-/// Compares the farthest x of a receiver that meets a target SIR with the reference, for `count` hops.
+/// Compares a receiver's farthest x for a target SIR with the reference, for `count` hops.
 ///
-/// `target` draws a target. The crate's x must be between the exact ones for targets 1e-6 (relative) higher and
-/// lower, within two f32 steps.
+/// `target` draws a target. The crate's x must be between the exact results for targets 1e-6 (relative) higher and
+/// lower. Errors of up to two f32 rounding steps are tolerated.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,

@@ -40,8 +40,9 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     (link, setup)
 }
 
-/// Returns the SIR of an outcome's worst hop, and the least distance of neighbours, m. The SIR is computed by the f64
-/// reference model.
+/// Returns the SIR of the worst hop in `outcome`, and the least distance of neighbouring relays, m.
+///
+/// The SIR is computed by the f64 reference model.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     let places: Vec<Place> = setpoints(outcome).into_iter().map(reference).collect();
     let apart = places.windows(2).map(|pair| pair[0].distance_m(&pair[1]));
@@ -49,8 +50,9 @@ fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     (sir(link, &places).unwrap(), apart)
 }
 
-/// Runs Algorithm 2's search of one relay to its end. Returns a position better than the relay's present position, if
-/// found.
+/// Runs one relay's search for a better position (a turn of Algorithm 2) to its end.
+///
+/// Returns a position better than the relay's present position, if found.
 fn searched(mut search: LocalSearch) -> Option<Placement> {
     loop {
         if let Poll::Ready(found) = search.step(500) {
@@ -63,8 +65,9 @@ fn rises(outcome: &Outcome) -> bool {
     outcome.rounds.windows(2).all(|pair| pair[1] >= pair[0])
 }
 
-/// Checks that the fine local search raises the SIR of fifty relays and that a coarse grid does not. The optimum, an
-/// SIR of 6.49838, is 19.4 % above that of the starting positions.
+/// Checks that Algorithm 2 raises the SIR of fifty relays by its fine search, but not by a coarse grid.
+///
+/// The optimum, an SIR of 6.49838, is 19.4 % above that of the starting positions.
 #[test]
 fn fine_search_gains_sir_over_a_coarse_grid() {
     let of = |rounds, local| {
@@ -103,9 +106,9 @@ fn fine_search_gains_sir_over_a_coarse_grid() {
     assert!((ten / 5.555 - 1.0).abs() < 1e-3, "{ten}");
 }
 
-/// Checks that the paper's grid search makes the same moves as a separate program.
+/// Checks that the paper's grid search makes the same moves as a separate reference program.
 ///
-/// The start positions are such that the SIRs of the hops differ much.
+/// The SIRs of the hops differ much at the start positions.
 #[test]
 fn grid_search_moves_as_the_reference_program() {
     let link = Link {
@@ -164,8 +167,9 @@ fn grid_search_moves_as_the_reference_program() {
     }
 }
 
-/// Checks that the fine search of Algorithm 2 for one relay is as good as a dense grid. The SIR of the relay's worse hop is compared. Both
-/// searches keep the minimum separation from the neighbours.
+/// Checks that the fine search of Algorithm 2 for one relay is as good as a dense grid search.
+///
+/// The lower SIR of the relay's two hops is compared. Both searches keep the minimum separation from the neighbours.
 #[test]
 fn the_fine_search_is_as_good_as_a_dense_grid() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));
@@ -231,8 +235,9 @@ fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
     Hops::new(mission, mission.interferer().unwrap(), before, 1.0, after)
 }
 
-/// Checks that no single relay could improve its position when Algorithm 2 ends. The algorithm must end before its
-/// last permitted round.
+/// Checks that Algorithm 2 ends where no move of a single relay would raise the SIR.
+///
+/// The algorithm must end before its last permitted round.
 #[test]
 fn adjusting_ends_in_a_local_optimum() {
     let local = Local::Grid {
@@ -276,7 +281,9 @@ fn adjusting_ends_in_a_local_optimum() {
     }
 }
 
-/// Checks that both local searches keep the minimum separation, even if a smaller one gave more SIR.
+/// Checks that the fine search and the grid search keep the minimum separation.
+///
+/// They must do so even where a smaller separation would give a higher SIR.
 #[test]
 fn relays_keep_their_separation_where_it_costs_sir() {
     for local in [

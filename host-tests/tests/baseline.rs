@@ -55,7 +55,7 @@ fn chains_have_the_reference_positions() {
     }
 }
 
-/// Returns the weakest received signal of a chain, W, from the path losses alone.
+/// Returns the weakest received signal on the hops of a chain, W. Interference is ignored.
 fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     let relay = link.relays[0];
     let height2 = relay.altitude_m * relay.altitude_m;
@@ -68,10 +68,10 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// Returns the largest value that the weakest signal can have with relays at grid points, W.
+/// Returns the largest possible value of a chain's weakest signal with relays at grid points, W.
 ///
-/// The grid has `points` steps. `chosen` has the positions of the first relays. The other `left` relays are not nearer
-/// to Tx than these.
+/// The grid divides the line into `points` steps. `chosen` has the positions of the first relays. The other `left`
+/// relays are not nearer to Tx than those first relays.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {
         return weakest_signal(link, chosen);
@@ -88,9 +88,10 @@ fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) ->
     best
 }
 
-/// Checks that no positions on a grid beat `blind_places`, which maximises the weakest signal.
+/// Checks that positions on a grid have no stronger weakest signal than those of `blind_places`.
 ///
-/// The random links have 1 to 3 relays. Interference is ignored.
+/// `blind_places` maximises the weakest signal of a chain. The random links have 1 to 3 relays. Interference is
+/// ignored.
 #[test]
 fn no_grid_has_a_stronger_weakest_signal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(11));
@@ -122,9 +123,10 @@ fn no_grid_has_a_stronger_weakest_signal() {
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Checks that the last relay is above Rx if fewer relays would give the same weakest signal.
+/// Checks that surplus relays shorten all hops, and that the last relay is above Rx.
 ///
-/// The hop from the last relay straight down to Rx then has the weakest signal. All other hops are shortened by the same factor.
+/// A relay is surplus if fewer relays give the same weakest signal, that of the hop from the last relay straight down
+/// to Rx. All other hops are shortened by the same factor.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);
@@ -136,7 +138,7 @@ fn surplus_relays_shorten_all_hops_in_proportion() {
     assert!(off(places[1] - places[0], step * 1000.0 / whole) < 1e-9);
 }
 
-/// Checks that the first relay is placed right above Tx if Tx has less power than the relays.
+/// Checks that the first relay is placed straight above Tx if Tx has less power than the relays.
 #[test]
 fn the_relay_of_the_weaker_ground_station_is_above_it() {
     let mut link = Link::paper(60);

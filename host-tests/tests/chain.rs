@@ -111,7 +111,7 @@ fn random_links_settle_at_their_optimum() {
 
 /// Checks the number of targets that the paper's fixed-step search tries, and the last target.
 ///
-/// Each target takes one sweep (a round of messages along the chain), and is 0.1 below the target before.
+/// Each target takes one sweep (a round of messages along the chain), and is 0.1 below the previous target.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [
@@ -156,8 +156,9 @@ fn silent_places_equal_those_by_messages() {
     }
 }
 
-/// Checks that message faults change the duration only, over 1 000 random seeds. The positions of eight relays equal
-/// those of a run without faults.
+/// Checks for 1 000 random seeds that message faults change only the duration of a run.
+///
+/// The positions of eight relays equal those of a run without faults.
 #[test]
 fn faults_change_only_the_time_to_agree() {
     let undisturbed = settle(Setup::new(mission(8)));
@@ -275,9 +276,9 @@ fn a_shared_channel_gives_the_positions_of_two_wires() {
     }
 }
 
-/// Checks that relays with their own altitudes and powers reach the optimum.
+/// Checks that relays with individual altitudes and powers reach the optimum.
 ///
-/// The leader does not know these altitudes and powers at first, so that the target SIR that it predicts is wrong.
+/// The leader does not know these altitudes and powers at first, so the target SIR that it predicts is wrong.
 #[test]
 fn a_chain_of_different_relays_is_solved_exactly() {
     let mission = mission(8);

@@ -21,10 +21,10 @@ use uav_relay_tools::fewest;
 /// Largest relative shortfall from the optimum SIR at which a result counts as optimal.
 const NEAR: f64 = 1e-3;
 
-/// Tolerated relative error of an upper bound that is too low: search tolerance and f32 rounding.
+/// Tolerated relative amount by which an upper bound is too low: search tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
 
-/// Returns true if a chain meets the SIR `target` with every relay as far along as `target` permits.
+/// Returns true if a chain meets the SIR `target` when each relay goes as far as `target` permits.
 fn is_met_greedily(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {
@@ -146,7 +146,7 @@ impl Tally {
     }
 }
 
-/// Formats the distribution of the ratios in `of`: upper bound to optimum.
+/// Formats the distribution of the ratios `of` of upper bound to optimum.
 fn spread(of: &mut [f64]) -> String {
     of.sort_by(f64::total_cmp);
     let Some(most) = of.last() else {
@@ -235,8 +235,10 @@ fn near_optimal_with_a_separation() {
     assert!(tally.tight() >= 70.0);
 }
 
-/// Draws identical relays in an uneven field of interference. The mean inverse interference, Upsilon, is given at two
-/// to twelve points. Its values differ by a factor of up to 300.
+/// Draws identical relays in an uneven field of interference.
+///
+/// The field has the mean inverse interference, Upsilon, at two to twelve points. The values of Upsilon differ by a
+/// factor of up to 300.
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -326,8 +328,8 @@ fn near_optimal_in_uneven_fields_by_unlike_relays() {
 
 /// Checks that chains agree by messages on target SIRs that they meet, and state a correct upper bound.
 ///
-/// No positions of the relays may have a higher SIR than the bound. Runs are with and without prediction and message
-/// faults.
+/// No positions of the relays may have a higher SIR than the bound. Runs are with and without prediction, and with and
+/// without message faults.
 #[test]
 fn chains_agree_by_messages_on_feasible_targets() {
     let mut rng = generator(904);

@@ -79,7 +79,7 @@ fn get(screen: &Screen, path: &str) -> Vec<u8> {
     format!("GET {path} HTTP/1.1\r\nHost: {}\r\n\r\n", screen.address()).into_bytes()
 }
 
-/// Opens the stream of snapshots.
+/// Opens the server's stream of snapshots of the chain.
 fn events(screen: &Screen) -> BufReader<TcpStream> {
     let mut stream = connect(screen);
     stream.write_all(&get(screen, "/events")).unwrap();

@@ -19,7 +19,7 @@ mod paper {
 
 const RELAYS: u16 = 5;
 
-/// Returns the report of a relay of a chain of `relays` relays without faults.
+/// Returns the report of relay `relay` in a chain of `relays` relays without faults.
 fn healthy(relay: u16, relays: u16) -> Report {
     let place = Some(Placement::on_line(160.0 * f32::from(relay), 20.0));
     let next = Some(relay + 1).filter(|it| *it <= relays);
@@ -76,7 +76,7 @@ impl Watched {
         }
     }
 
-    /// Advances the time by one second. All relays that are not off report.
+    /// Advances the time by one second. Every relay that is not switched off sends a report.
     fn second(&mut self) {
         self.second += 1;
         let now = Instant::from_millis(1_000 * self.second);
@@ -387,7 +387,9 @@ fn a_silent_relay_next_to_tx_or_rx_is_lost_once_its_neighbour_is_the_last_one() 
     }
 }
 
-/// Checks that neighbours reported before a relay's last report do not make it lost.
+/// Checks that a neighbour's outdated report does not mark a relay as lost.
+///
+/// A report is outdated if the neighbour sent it before the lost relay's last report.
 #[test]
 fn neighbours_from_before_the_loss_do_not_make_a_relay_lost() {
     let mut watched = Watched::new();
@@ -421,7 +423,9 @@ fn the_last_relay_before_tx_or_rx_is_taken_at_its_word_for_four_numbers() {
     assert_eq!(lost, [4, 5, 6, 7]);
 }
 
-/// Checks both relays of a chain of two: the other one has no neighbour on either side then.
+/// Checks that either relay of a chain of two is shown as lost.
+///
+/// The remaining relay then reports no neighbour relay, upstream or downstream.
 #[test]
 fn one_of_two_relays_is_lost_once_the_other_one_is_alone() {
     for (lost, change, hops) in [(1, "2:noback", "Tx-2 2-Rx "), (2, "1:nonext", "Tx-1 1-Rx ")] {
@@ -441,9 +445,10 @@ fn one_of_two_relays_is_lost_once_the_other_one_is_alone() {
     }
 }
 
-/// Checks that the alarm of another mission begins again after the relay was back.
+/// Checks that the alarm about another mission begins again after relay 2 was back.
 ///
-/// It begins when the relay does not report, and when its number is refused for longer than the neighbours remember.
+/// It begins in two cases: relay 2 stops reporting, or its neighbours refuse its mission for longer than they remember
+/// a refusal.
 #[test]
 fn the_alarm_of_another_mission_begins_again() {
     let alarm = "Warning relay 2 has another mission: reported by relays 1 and 3";

@@ -11,9 +11,8 @@ pub const PROFILE: &str = "firmware";
 
 /// Builds the firmware `examples` and returns the folder with copies of their images.
 ///
-/// If `smallest` is true, the images are built with the log as the only feature, otherwise with all features. The name
-/// of a copy is that of the example, after `smallest_` if `smallest` is true. The builds are in the usual target folder,
-/// where `cargo cost` and `cargo ci` find their dependencies again.
+/// If `smallest` is true, the only feature is the log, and the names of the copies begin with `smallest_`; otherwise
+/// the images have all features. Cargo's target folder is the usual one, so that dependencies are built only once.
 ///
 /// # Errors
 /// The output of cargo, if it fails; or a copy that cannot be written.

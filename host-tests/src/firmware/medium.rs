@@ -13,7 +13,9 @@ use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 /// Maximum number of bytes collected while a link waits for a delimiter.
 const LONGEST: usize = 2 * MAX_FRAME;
 
-/// Simulated links between drones, with latency and faults. The caller numbers senders and receivers.
+/// Simulated links between drones, with latency and faults. Senders and receivers have indices.
+///
+/// The caller chooses the indices.
 #[derive(Debug)]
 pub struct Medium {
     link: LinkSpec,
@@ -23,7 +25,7 @@ pub struct Medium {
     /// Receivers and bytes of the frames in transit, by time of arrival and order of sending.
     flying: BTreeMap<(Instant, u64), (usize, Vec<u8>)>,
     order: u64,
-    /// State of each sender: bytes since its last delimiter, and time when its link becomes idle.
+    /// State of each sender's link: bytes since the last delimiter, and time when the link becomes idle.
     lines: Vec<(Vec<u8>, Instant)>,
 }
 

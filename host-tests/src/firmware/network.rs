@@ -29,7 +29,7 @@ pub struct Network {
     injected: Arc<Mutex<Injected>>,
 }
 
-/// Bytes sent by the port `sender`. Without bytes it ends the network.
+/// Bytes that a drone has sent on the port with the index `sender`. An empty message ends the network.
 #[derive(Debug)]
 struct PortBytes {
     sender: usize,
@@ -51,7 +51,7 @@ pub fn chain(drones: usize) -> Hearers {
         .collect()
 }
 
-/// Returns the topology of a radio channel that reaches all drones within `range` drones.
+/// Returns the topology of a radio channel that reaches up to `range` drones in each direction.
 ///
 /// Each drone has one port.
 pub fn radio(drones: usize, range: usize) -> Hearers {
@@ -65,7 +65,7 @@ pub fn radio(drones: usize, range: usize) -> Hearers {
 }
 
 impl Network {
-    /// Connects the drones' `ports` through `medium`. Complete frames that are already there are discarded.
+    /// Connects the drones' `ports` through `medium`. Complete frames that have already arrived are discarded.
     ///
     /// # Errors
     /// A socket cannot be read, configured, or shared between two threads.
@@ -110,7 +110,7 @@ impl Drop for Network {
     }
 }
 
-/// Reads the bytes that have arrived at a port, and returns those of the last, incomplete frame.
+/// Reads the bytes that have arrived at a port. Returns the bytes after the last complete frame.
 fn begun(mut port: &UnixStream) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     port.set_nonblocking(true)?;

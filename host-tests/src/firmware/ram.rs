@@ -10,11 +10,11 @@ use super::journal::{BLANK, Flash};
 pub struct Ram {
     /// Content of each sector, words of 32 bits.
     pub sectors: [Vec<u32>; 2],
-    /// Number of word writes and erases until power fails, in the middle of the last of them.
+    /// Number of writes and erases until the power fails; it fails during the last of these operations.
     ///
-    /// 0 while the power is off; `None` if it does not fail.
+    /// A write is a word of 32 bits. The number is 0 while the power is off, and `None` if no failure is planned.
     pub power: Option<usize>,
-    /// Number of next writes that fail because of wear.
+    /// Number of the following writes that fail because of wear.
     pub worn: usize,
     /// Indices of the erased sectors, in order.
     pub erased: Vec<usize>,
@@ -23,7 +23,7 @@ pub struct Ram {
 
 enum Power {
     On,
-    /// Power fails in this operation, so only some of the bits change.
+    /// Power fails during this write or erase, so only some of the bits change.
     Fails,
     Off,
 }
@@ -51,7 +51,7 @@ impl Ram {
         }
     }
 
-    /// Switches the power on, and cancels a planned failure. Returns true if the power had failed.
+    /// Switches the power on, and cancels a planned power failure. Returns true if the power had failed.
     pub fn switch_on(&mut self) -> bool {
         self.power.take() == Some(0)
     }

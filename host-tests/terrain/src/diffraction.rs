@@ -47,10 +47,10 @@ impl Default for Surface {
     }
 }
 
-/// Returns the diffraction loss of the path over `profile`, dB. The loss is the same if the other antenna sends.
+/// Returns the diffraction loss of the path over `profile`, dB, at least 0; equal in both directions.
 ///
-/// `ends_m` are the heights of the two antennas above the sea, at the ends of the profile. The profile has at least two
-/// points, with increasing distances from 0 on. The loss is at least 0.
+/// `ends_m` are the heights above the sea of the antennas at the first and the last point of the profile. The profile
+/// has at least two points; their distances begin with 0 and increase.
 pub fn loss_db(profile: &[Point], ends_m: [f64; 2], wavelength_m: f64) -> f64 {
     loss_over_db(profile, ends_m, wavelength_m, Surface::default())
 }

@@ -21,7 +21,7 @@ use tiff::tags::Tag;
 /// Range of valid heights of the ground, m. Any other value in an elevation file means that the height is unknown.
 const HEIGHTS: std::ops::RangeInclusive<f64> = -500.0..=9000.0;
 
-/// Largest difference of cell size between two files of one grid, as a fraction of the size.
+/// Largest relative difference between the cell sizes of two files of one grid.
 const SAME_CELL: f64 = 1e-6;
 
 /// Largest offset between the grid points of two files, as a fraction of a cell.
@@ -105,7 +105,7 @@ struct Tile {
     cell: [f64; 2],
     /// Coordinates, east then north, of the tile's north-west grid point.
     corner: [f64; 2],
-    /// Column and row, in the whole grid, of the tile's north-west grid point.
+    /// Column and row of the tile's north-west grid point in the grid of all files.
     at: [i64; 2],
     columns: usize,
     rows: usize,
@@ -117,7 +117,7 @@ struct Tile {
 /// Height at one grid point, or the reason why it is unknown.
 enum Node<'a> {
     Height(f64),
-    /// The height is unknown: the file has an invalid value at this point. The fields are the file and the value.
+    /// The height is unknown: the file has an invalid value at this point. The fields are the tile and the value.
     Hole(&'a Tile, f32),
     Outside,
 }
@@ -184,7 +184,9 @@ impl Terrain {
         interpolated(at, |node| self.node_m(node, lat_deg, lon_deg))
     }
 
-    /// Returns the column and the row of a point in the grid. Whole numbers are grid points.
+    /// Returns the column and the row of a point in the elevation grid.
+    ///
+    /// They are whole numbers at a grid point, and fractions between grid points.
     pub fn cells(&self, lat_deg: f64, lon_deg: f64) -> [f64; 2] {
         let [east, north] = self.system.coordinates(lat_deg, lon_deg);
         [
@@ -246,7 +248,7 @@ impl Terrain {
     }
 }
 
-/// Returns the height at a column and row, by bilinear interpolation between grid points.
+/// Returns the height at a fractional column and row, by bilinear interpolation.
 ///
 /// `height` returns the height at a grid point.
 fn interpolated<E>(
@@ -287,9 +289,10 @@ impl Tile {
         read.map_err(|problem| format!("{name}: {problem}"))
     }
 
-    /// Returns the column and row, in the grid of a second tile, of this tile's north-west grid point.
+    /// Returns the column and row of this tile's north-west grid point in the grid of another tile.
     ///
-    /// The error names the property in which the two grids differ.
+    /// `system`, `cell` and `corner` describe the other tile. The error names the property in which the two grids
+    /// differ.
     fn place_in(
         &self,
         system: System,
@@ -319,7 +322,7 @@ impl Tile {
         Ok(at)
     }
 
-    /// Checks that the heights of two overlapping files agree.
+    /// Checks that the heights of this tile and of an overlapping tile agree.
     ///
     /// # Errors
     /// A text about the greatest difference, with both files, the place and both heights.
@@ -578,13 +581,13 @@ fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
 
 /// Returns true if `value` is the scale 1, the offset 0 or the unit metre.
 ///
-/// With these three, heights are in metres.
+/// A file with this scale, offset and unit has heights in metres.
 fn is_metres(value: &str) -> bool {
     let is_number = [1.0, 0.0].map(Ok).contains(&value.parse::<f64>());
     is_number || ["m", "metre", "meter"].contains(&value.to_lowercase().as_str())
 }
 
-/// Converts the decoded values of a GeoTIFF picture to heights.
+/// Converts the decoded values of a GeoTIFF image to heights.
 #[expect(clippy::cast_possible_truncation, reason = "heights are far smaller")]
 fn numbers(values: DecodingResult) -> Result<Vec<f32>, String> {
     Ok(match values {

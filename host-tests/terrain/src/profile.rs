@@ -23,24 +23,27 @@ use crate::grid::Terrain;
 /// Fraction of the first Fresnel zone's radius that must be free of ground on a clear hop.
 pub const FREE: f64 = 0.6;
 
-/// Largest number of equal steps of a profile.
+/// Maximum number of the equal steps that divide a profile's length.
 const MOST_STEPS: f64 = 20_000.0;
 
-/// Least number of equal steps of a profile.
+/// Minimum number of the equal steps that divide a profile's length.
 const LEAST_STEPS: f64 = 16.0;
 
 /// Smallest distance between two points of a profile, m.
 const APART_M: f64 = 1e-3;
 
-/// Smallest height difference between a parabola's vertex and its ends, m.
+/// Least height difference between the vertex of a parabola and its ends, m.
 ///
-/// A vertex with a smaller difference is no profile point.
+/// The ground between two grid lines is a parabola along a straight line. A vertex with a smaller difference is no
+/// profile point.
 const VERTEX_M: f64 = 1e-3;
 
-/// Side length of a square in which the model's column and row are taken as linear in x and y, m.
+/// Side length of a square in which the elevation grid counts as linear in x and y, m.
+///
+/// Within the square, the column and row of a point are linear functions of x and y.
 const SQUARE_M: f64 = 200.0;
 
-/// Largest accepted difference between a site's height in the scenario and in the elevation model, m.
+/// Largest accepted difference of Tx's or Rx's height between scenario and elevation model, m.
 pub const SITE_ERROR_M: f64 = 15.0;
 
 /// Distance from Tx or Rx, m, at which the assumed error of the heights reaches its full value.
@@ -85,7 +88,7 @@ pub struct Profile {
 pub enum State {
     /// The line of sight is above the ground by at least 60 % of the first Fresnel zone's radius.
     Clear,
-    /// The line of sight is above the ground, but by less than a clear hop needs.
+    /// The line of sight is above the ground, but its clearance is less than a clear hop needs.
     Grazing,
     /// The ground interrupts the line of sight.
     Blocked,
@@ -181,7 +184,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the point at `x_m`, `y_m` and altitude 0.
+    /// Returns the geodetic position of the point at `x_m`, `y_m` and altitude 0.
     ///
     /// Points of altitude 0 are on the straight line from the ground at Tx to the ground at Rx.
     ///
@@ -304,7 +307,10 @@ impl<'a> Ground<'a> {
         Ok(nodes)
     }
 
-    /// Adds the elevation model's nodes in a small rectangle to `nodes`.
+    /// Adds the elevation model's nodes in a rectangle to `nodes`.
+    ///
+    /// The rectangle begins at [x, y], and is `wide` m long in x and `high` m in y. It must be so small that column and
+    /// row are linear in x and y. Nodes for which `is_in` returns false are left out.
     fn nodes_of(
         &self,
         [x, y]: [f64; 2],
@@ -346,7 +352,7 @@ impl<'a> Ground<'a> {
         Ok(())
     }
 
-    /// Returns the height at the column and row `cells`. The column and row must be those of the position [x, y].
+    /// Returns the ground height at the position [x, y]. `cells` must be the column and row of this position.
     fn height_of(&self, cells: [f64; 2], [x_m, y_m]: [f64; 2]) -> Result<f64, String> {
         let known = self.terrain.height_at(cells);
         known.map_or_else(|| self.height_m(x_m, y_m), Ok)
@@ -354,8 +360,8 @@ impl<'a> Ground<'a> {
 
     /// Returns the column and row of the position [x, y].
     ///
-    /// Positions are rounded to 1e-7 degrees, about 1 cm. The second argument, from [`turn`](Self::turn), corrects this
-    /// rounding.
+    /// Positions are rounded to 1e-7 degrees, about 1 cm. The result of [`turn`](Self::turn), given as the second
+    /// argument, serves to correct this rounding.
     fn cells(&self, [x, y]: [f64; 2], [[a, b], [c, d]]: [[f64; 2]; 2]) -> Result<[f64; 2], String> {
         let point = self.point(x, y)?;
         let (lat, lon) = (f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7);
@@ -367,7 +373,7 @@ impl<'a> Ground<'a> {
         Ok([column + a * u + b * v, row + c * u + d * v])
     }
 
-    /// Returns the changes of column and row per metre of x and per metre of y, near a position.
+    /// Returns the derivatives of column and row with respect to x and y near a position, per metre.
     fn turn(&self, [x, y]: [f64; 2]) -> Result<[[f64; 2]; 2], String> {
         let far_m = 0.5 * SQUARE_M;
         let around_m = f64::from(Axis::AROUND_M);
@@ -404,7 +410,10 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the points of a profile. The heights of the points include the assumed error.
+    /// Returns the points of the profile between two antennas. Their heights include the assumed error.
+    ///
+    /// Points are the ends of at least `least_steps` equal steps, crossings with grid lines, and vertices between
+    /// these.
     fn along(&self, [from, to]: [Node; 2], least_steps: f64) -> Result<Vec<Point>, String> {
         let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);
         let length = dx.hypot(dy);
@@ -498,7 +507,9 @@ const fn mixed(from: f64, to: f64, share: f64) -> f64 {
     from + share * (to - from)
 }
 
-/// Returns the value at `share` of the parabola through three values at 0, 1/2 and 1.
+/// Returns the value at `share`, 0 to 1, of the parabola through `start`, `middle` and `end`.
+///
+/// These are its values at 0, 1/2 and 1.
 fn parabola([start, middle, end]: [f64; 3], share: f64) -> f64 {
     let slope = 4.0 * middle - 3.0 * start - end;
     let bend = 2.0 * (start + end) - 4.0 * middle;
@@ -520,7 +531,9 @@ fn height_at(terrain: &Terrain, point: Geodetic) -> Result<f64, String> {
     terrain.height_m(f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7)
 }
 
-/// Returns the height of the curved earth above the straight line between the ends of a hop, m.
+/// Returns the height of the curved earth above the straight line between a hop's ends, m.
+///
+/// `along_m` is the distance from one end, and `length_m` is the length of the hop.
 pub fn bulge_m(along_m: f64, length_m: f64) -> f64 {
     along_m * (length_m - along_m) / (2.0 * EARTH_M)
 }

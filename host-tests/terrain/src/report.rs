@@ -27,7 +27,7 @@ pub struct HopReport {
     pub obstacle_lat_deg: f64,
     /// Longitude of the worst obstacle, degrees.
     pub obstacle_lon_deg: f64,
-    /// Diffraction loss of the hop by Recommendation ITU-R P.526, dB; the same from Tx to Rx and back.
+    /// Diffraction loss of the hop by Recommendation ITU-R P.526, dB; it is equal in both directions.
     pub diffraction_db: f64,
     /// SIR of the hop in the direction to Rx with its diffraction loss, dB.
     ///
@@ -58,8 +58,8 @@ pub struct InterfererHeight {
     pub index: usize,
     /// Least and greatest altitude of the interferer's antenna above the straight line Tx-Rx, m.
     ///
-    /// Absent if the elevation files do not cover the interferer. The two values differ if the interferer's position is
-    /// an area.
+    /// Absent if the elevation files do not cover the interferer. The two values differ if the interferer is somewhere
+    /// in an area, and not at one point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub altitude_m: Option<[f64; 2]>,
 }
@@ -71,10 +71,10 @@ pub struct TerrainReport {
     pub hops: Vec<HopReport>,
     /// Heights of the relays above the terrain, from Tx to Rx.
     pub heights: Vec<RelayHeight>,
-    /// Altitudes of the interferers that the SIRs of the hops are computed with.
+    /// Altitudes of the interferers, as used for the SIRs of the hops.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub interferers: Vec<InterfererHeight>,
-    /// Position error of the relays, m. Obstacles within this distance count as below the relay.
+    /// Position error of the relays, m. An obstacle within this distance of a relay counts as below the relay.
     pub position_error_m: f64,
     /// SIR of the worst hop with the diffraction losses, linear. The plan's `sir` is without these losses.
     pub terrain_sir: f64,

@@ -15,28 +15,29 @@ use crate::report::TerrainReport;
 pub struct Limits {
     /// Largest error of a relay's position, the same in every direction.
     pub position_error_m: f64,
-    /// Least and greatest height above the ground.
+    /// Least and greatest height of a relay above the ground.
     pub above_ground_m: [f64; 2],
-    /// Least distance along x between the rooms of two neighbours.
+    /// Least distance along x between the rooms (intervals of x) of two neighbouring relays.
     pub apart_m: f64,
     /// Wavelength of the carrier.
     pub wavelength_m: f64,
 }
 
-/// Node of the chain: the interval of x in which it may be, m, and its altitude above the datum, m.
+/// Interval of x in which a node of the chain may be, m, and the node's altitude above the datum, m.
 ///
-/// The datum is the straight line from the ground at Tx to the ground at Rx.
+/// The node is Tx, a relay or Rx. The datum is the straight line from the ground at Tx to the ground at Rx.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     x_m: [f64; 2],
     h_m: f64,
 }
 
-/// Highest and lowest ground along the line Tx-Rx, as points of x, m, and height above the datum, m.
+/// Highest and lowest ground along the line Tx-Rx: points of x, m, and height above the datum, m.
 ///
-/// Between two points the ground is no higher and no lower than at the points.
+/// Between two points of `highest` no ground is higher than these points. Between two points of `lowest` no ground is
+/// lower.
 struct Ridge {
-    /// Largest distance between two adjacent points.
+    /// Largest distance along x between two adjacent points.
     step_m: f64,
     /// Highest ground within the position error, plus the assumed error of the heights.
     highest: Vec<[f64; 2]>,
@@ -90,16 +91,17 @@ impl Ridge {
         ))
     }
 
-    /// Returns the points with x from `from_m` to `to_m`.
+    /// Returns those of `points` whose x is from `from_m` to `to_m`.
     fn between(points: &[[f64; 2]], [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
         let first = points.partition_point(|[x_m, _]| *x_m < from_m);
         let points = points.iter().skip(first).copied();
         points.take_while(move |[x_m, _]| *x_m <= to_m)
     }
 
-    /// Returns true if every hop between the two intervals is clear: the ground is below its Fresnel zone.
+    /// Returns true if every hop from a position in `from` to a position in `to` is clear.
     ///
-    /// `share` is the fraction of the zone's radius that must be free of ground.
+    /// A hop is clear if no ground is in the inner part of its Fresnel zone; `share` is that part's fraction of the
+    /// radius.
     fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
         let ([a, b], [c, d]) = (from.x_m, to.x_m);
         Self::between(&self.highest, [a, d]).all(|[x, height]| {
@@ -123,10 +125,10 @@ fn steps(length_m: f64, step_m: f64) -> (f64, u32) {
     (step, steps.max(1))
 }
 
-/// Returns the room of each relay: the x, m, at which its hops stay as clear as in `report`.
+/// Returns each relay's room: the interval of x, m, in which its hops stay as clear as in `report`.
 ///
-/// This holds while all relays are in their rooms, within the position error. A relay in its room also keeps within its
-/// limits of height above the ground. `None` for a relay without a room around its position.
+/// The hops stay clear while all relays are in their rooms, up to the position error. A room also keeps the relay
+/// within its limits of height above the ground. `None` for a relay without a room around its position.
 ///
 /// # Errors
 /// A text that names the position: the elevation files do not cover it, or have no height there.

@@ -9,8 +9,9 @@ use uav_relay::pointing::Bearing;
 /// Maximum computation error of a [`Bearing`]'s azimuth and elevation, rad: 0.17 degrees.
 const MAX_ERROR_RAD: f32 = 0.002_967;
 
-/// Returns the errors of [`Bearing::new`] compared with f64. These are the errors of azimuth, elevation and
-/// direction, rad, and the relative error of the distance.
+/// Returns the errors of [`Bearing::new`] relative to a computation in f64.
+///
+/// They are the errors of azimuth, elevation and direction, rad, and the relative error of the distance.
 fn errors(ahead_m: f32, aside_m: f32, climb_m: f32) -> [f64; 4] {
     let bearing = Bearing::new(ahead_m, aside_m, climb_m).unwrap();
     let [x, y, h] = [ahead_m, aside_m, climb_m].map(f64::from);

@@ -3,8 +3,7 @@
 use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::watch::{ObservedState, groups, has_agreed};
 
-/// Returns the state of a relay with a valid position, as observed in membership view `view`. It is relay `index` of
-/// `relays`.
+/// Returns the state of relay `index` of `relays`, with a valid position, in membership view `view`.
 fn seen(view: u32, relays: u16, index: u16) -> ObservedState {
     ObservedState {
         is_on: true,

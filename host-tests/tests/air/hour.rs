@@ -26,7 +26,7 @@ fn losing(share: f64, burst: f64) -> Setup {
     setup
 }
 
-/// Formats minimum, median, 99th percentile and maximum of times, s.
+/// Formats minimum, median, 99th percentile and maximum of `times`, s.
 fn spread(mut times: Vec<f64>) -> String {
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize];
@@ -99,9 +99,8 @@ fn availability_in_an_hour_on_a_bad_channel() {
 
 /// Random seeds of simulated hours in which one relay repeatedly loses the links to both neighbours.
 ///
-/// These runs test that the relay gets its links back. Half of the frames are lost, in bursts of 20. Each silence between the relay's own
-/// rare requests must not count as another loss. Otherwise the relay would never use its links again, and the chain would be complete for
-/// only 4, 2, 11 and 28 % of the hour. The environment variable `SEEDS` (as `201-800`) overrides the seeds.
+/// Half of the frames are lost, in bursts of 20. A silence between two of the relay's rare requests must not count as a
+/// loss; else the chain is complete for only 4, 2, 11 and 28 % of the hour. `SEEDS=201-800` overrides the seeds.
 const LONG_SEARCHES: [u64; 4] = [519, 625, 777, 1_030];
 
 #[test]

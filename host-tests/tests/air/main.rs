@@ -24,7 +24,7 @@ struct Bench {
     hearers: Vec<Vec<usize>>,
     due: BTreeMap<(Instant, u64), AirEvent>,
     order: u64,
-    /// Completed frames with their end times.
+    /// Completed frames, each with the time at which it ended.
     sent: Vec<(Instant, Sent)>,
 }
 
@@ -52,7 +52,9 @@ impl Bench {
         Self::new(access, (0..nodes).map(others).collect(), seed)
     }
 
-    /// Advances the clock to `at`, then gives `node` a frame to send. Returns true if the node accepts the frame.
+    /// Advances the clock to `at`, then gives `node` a frame to send.
+    ///
+    /// Returns false if the queue of the node's radio is full.
     fn offer(&mut self, at: Instant, node: usize, frame: &[u8]) -> bool {
         self.go_on(at);
         let mut agenda = Agenda::new();
@@ -83,8 +85,9 @@ impl Bench {
         }
     }
 
-    /// Processes all remaining events. Returns each frame's sender and receivers in the order in which the frames
-    /// end, and the channel's counters.
+    /// Processes all remaining events. Returns the sender and the receivers of each frame, and the counters.
+    ///
+    /// The frames are in the order in which they ended; the counters are those of the channel.
     fn end(mut self) -> (Vec<(usize, Vec<usize>)>, AirCounts) {
         self.go_on(Instant::from_micros(u64::MAX));
         let sent = self.sent.into_iter();

@@ -84,7 +84,9 @@ impl Write for Uart {
     }
 }
 
-/// Simulated PX4 that reaches targets at once. Its pilot flies it until `given_at`, and the companion from then on.
+/// Simulated PX4 that is at each target at once.
+///
+/// Its pilot flies it until `given_at`, and the companion flies it after that.
 struct Vehicle {
     mute: Cell<bool>,
     given_at: Cell<Instant>,
@@ -199,8 +201,9 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// Creates relay 1 of `relays` relays, between surveyed positions of Tx and Rx. It has a motion guard (collision
-/// avoidance).
+/// Creates relay 1 of `relays`, with surveyed positions of Tx and Rx.
+///
+/// The relay has a motion guard (collision avoidance).
 fn relay(relays: u16) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -234,14 +237,16 @@ struct Scene {
 }
 
 impl Scene {
-    /// Creates a test scene with a single relay. If `tells` is true, the firmware gives the relay's events to the
-    /// autopilot link.
+    /// Creates a test scene with a single relay.
+    ///
+    /// If `tells` is true, the firmware passes the relay's events to the autopilot link.
     fn new(tells: bool) -> Self {
         Self::of(1, tells)
     }
 
-    /// Creates a test scene with relay 1 of `relays`. If `tells` is true, the firmware gives the events of relay 1 to
-    /// the autopilot link.
+    /// Creates a test scene with relay 1 of `relays`.
+    ///
+    /// If `tells` is true, the firmware passes the events of relay 1 to the autopilot link.
     fn of(relays: u16, tells: bool) -> Self {
         let time = Time::default();
         let pool = LocalPool::new();
@@ -343,8 +348,9 @@ fn the_drone_is_engaged_and_led_to_its_position() {
     }
 }
 
-/// Checks that setpoint control ends if the autopilot falls silent. Setpoint control returns only if the pilot
-/// chooses it again.
+/// Checks that setpoint control ends if the autopilot falls silent.
+///
+/// Setpoint control returns only after the pilot has chosen OFFBOARD again.
 #[test]
 fn a_silent_autopilot_is_found_again() {
     let mut scene = Scene::new(true);

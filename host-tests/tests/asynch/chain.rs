@@ -41,7 +41,7 @@ pub(crate) struct Drone {
     pub(crate) setpoint: Option<Placement>,
     pub(crate) events: Vec<(Instant, Event)>,
     pub(crate) rejected: u32,
-    /// Counters of the upstream or shared port, then of the downstream port.
+    /// Statistics of the relay's ports: the upstream or shared port first, then the downstream port.
     pub(crate) counted: [SerialStats; 2],
 }
 
@@ -52,7 +52,7 @@ pub(crate) struct Flown {
     pub(crate) lines: Vec<Vec<TimedFrame>>,
 }
 
-/// Simulates a chain until a given time, with a task for every relay and one for its firmware.
+/// Simulates a chain until a given time. Each relay has a task, and its firmware has another task.
 pub(crate) fn fly(
     wiring: Wiring,
     relays: u16,

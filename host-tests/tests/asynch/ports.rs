@@ -22,7 +22,7 @@ use crate::wire::{BAUD, BYTE_TIME, Rx, Tx, WriterFault, line};
 #[derive(Default)]
 struct Taker {
     taken: Rc<RefCell<Vec<u8>>>,
-    /// Number of further writes that complete; the next one after them blocks for ever.
+    /// Number of writes that still complete. The write after them blocks for ever.
     writes: Rc<Cell<usize>>,
     /// Number n such that every n-th write fails; 0 if no write fails.
     fails: usize,

@@ -52,7 +52,7 @@ pub(crate) struct Line {
 
 pub(crate) type Shared = Rc<RefCell<Line>>;
 
-/// Creates a line with `ends` ends and a buffer of `capacity` bytes.
+/// Creates a line with `ends` ends and a send buffer of `capacity` bytes.
 pub(crate) fn line(ends: usize, capacity: usize) -> Shared {
     Rc::new(RefCell::new(Line {
         inboxes: (0..ends).map(|_| Inbox::default()).collect(),
@@ -147,7 +147,7 @@ impl Write for Tx {
         }
     }
 
-    /// Waits until all but the last 4 bytes have left, like a HAL that does not know of its FIFO.
+    /// Waits until all but the last 4 bytes have left, like a HAL that ignores the UART's FIFO of 4 bytes.
     async fn flush(&mut self) -> Result<(), Infallible> {
         let left = {
             let line = self.line.borrow();
@@ -162,7 +162,7 @@ impl Write for Tx {
 }
 
 impl Line {
-    /// Sends bytes of end `from`, at most to the end of a frame. Returns the number of bytes sent.
+    /// Sends bytes from end `from`, up to the end of a frame. Returns the number of bytes sent.
     fn put(&mut self, from: usize, bytes: &[u8], now: Instant, fault: WriterFault) -> usize {
         let mut count = 0;
         for &byte in bytes {

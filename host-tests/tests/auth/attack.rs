@@ -124,7 +124,7 @@ fn under_attack(wiring: Wiring, count: u64) {
     }
 }
 
-/// Returns the number of attacks to simulate: the environment variable `COUNT`, or a million.
+/// Returns the number of attacks to simulate: the environment variable `COUNT`, or else a million.
 fn count() -> u64 {
     std::env::var("COUNT")
         .ok()

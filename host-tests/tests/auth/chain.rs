@@ -104,7 +104,9 @@ fn other_methods_give_the_same_positions_when_signed() {
     }
 }
 
-/// Checks that a rebooted relay, also the leader, rejoins the chain with its next epoch.
+/// Checks that a rebooted relay, for example the leader, rejoins the chain with its next epoch.
+///
+/// The epoch is the relay's number of starts.
 #[test]
 fn a_rebooted_relay_rejoins_by_new_handshakes() {
     let events = [

@@ -42,8 +42,9 @@ impl Link {
         self.deliver(&handshake.signed(&KEY, nonces))
     }
 
-    /// Sends relay 2 a signed heartbeat with this frame counter. Returns the name of the only statistics counter that
-    /// it increments, if any.
+    /// Sends relay 2 a signed heartbeat with the frame counter `counter`.
+    ///
+    /// Returns the name of the statistics counter that relay 2 increments, if it increments exactly one.
     fn send_with_counter(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
         frame.0.extend([3, 0, 0, 0, 0, 0, 0]);
@@ -134,7 +135,7 @@ fn a_tag_for_other_nonces_counts_as_forged() {
 
 /// Checks the warning in the documentation of `Auth::epoch`: a relay must not start with a used epoch.
 ///
-/// If it does, its neighbour ignores the relay's frames as replayed, and the relay accepts old frames of the
+/// If a relay does so, its neighbour ignores the relay's frames as replayed, and the relay accepts old frames of the
 /// neighbour.
 #[test]
 fn a_reused_epoch_is_not_accepted_as_a_restart() {

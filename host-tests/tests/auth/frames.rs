@@ -119,7 +119,9 @@ pub(crate) fn handshake(
     handshake
 }
 
-/// Returns a handshake nonce. The epoch is in the upper half, and the number `made` of earlier nonces in the lower.
+/// Returns a handshake nonce: the epoch in the upper half, the number `made` in the lower half.
+///
+/// `made` is the number of nonces that the node has made before.
 pub(crate) fn nonce(epoch: u32, made: u32) -> u64 {
     u64::from(epoch) << 32 | u64::from(made)
 }

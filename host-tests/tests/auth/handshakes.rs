@@ -68,7 +68,9 @@ fn replayed_handshakes_change_no_position() {
     }
 }
 
-/// Checks that a booted relay accepts each replayed handshake at most once. After that it accepts a genuine handshake.
+/// Checks that a rebooted relay accepts each replayed handshake at most once.
+///
+/// After that it accepts a genuine handshake.
 #[test]
 fn replayed_handshakes_are_answered_once_and_superseded() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -160,8 +162,8 @@ fn a_silent_neighbour_is_lost_despite_replays() {
 
 /// Returns the time, ms, until relay 1 reports its silent neighbour as lost in spite of replays.
 ///
-/// An attacker replays the handshakes of `recorded` to relay 1. The second value is the number of handshakes that
-/// relay 1 accepts.
+/// An attacker replays the handshakes of `recorded` to relay 1. The second value returned is the number of handshakes
+/// that relay 1 accepts.
 fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
     let mut lost_after = None;

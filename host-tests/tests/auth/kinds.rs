@@ -13,9 +13,9 @@ use super::net::{Net, RecordedFrame};
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
-    /// Attack: replay of a frame that was recorded after the last start of both ends.
+    /// Attack: replay of a frame recorded since the last start of both its sender and its receiver.
     Replayed,
-    /// Attack: replay of a frame that was recorded before the last start of one end.
+    /// Attack: replay of a frame recorded before the last start of its sender or of its receiver.
     FromBefore,
     /// Attack: a recorded frame with flipped bits and a correct CRC.
     Flipped,
@@ -36,13 +36,15 @@ pub(crate) enum Kind {
     Untagged,
     /// Attack: a valid message of any kind with a random authentication tag.
     AnyWithRandomTag,
-    /// Attack: replay of a mission offer, recorded after the last start of both ends, to any relay.
+    /// Attack: replay to any relay of a mission offer recorded since the last start of both ends.
+    ///
+    /// The ends are the sender and the receiver of the recorded offer.
     OfferReplayed,
-    /// Attack: replay of a mission offer that was recorded before the last start of one end.
+    /// Attack: replay of a mission offer recorded before the last start of its sender or its receiver.
     OfferFromBefore,
     /// Attack: a recorded mission offer with a changed counter, body or tag.
     OfferAltered,
-    /// Attack: an offer of a mission that was never uploaded, in the name of any node.
+    /// Attack: a forged offer, in the name of any node, of a mission that was never uploaded.
     OfferForged,
     /// Attack: a valid or recorded message that claims to come from the ground station.
     FromGround,
@@ -79,7 +81,7 @@ impl Kind {
     }
 }
 
-/// Frame that the attacker sends, its receiver, and the receiver's counter that it must increment.
+/// Frame that the attacker sends, its receiver, and the counter that the receiver must increment.
 pub(crate) struct Attack {
     pub(crate) to: u16,
     pub(crate) port: Port,
@@ -105,7 +107,7 @@ pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     ]
 }
 
-/// Returns the name of the counter that has increased by one, if no other has changed; else `None`.
+/// Returns the name of the counter that has increased by one, if it is the only changed counter.
 ///
 /// Only the counters that the function `counters` lists are considered.
 pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
@@ -218,7 +220,7 @@ impl Attacker {
         })
     }
 
-    /// Returns an attack's frame, and the counter that this frame increments if its addresses are valid.
+    /// Returns an attack's frame, and the counter that the receiver increments if the addresses are valid.
     fn frame(
         &mut self,
         net: &Net,
@@ -352,8 +354,9 @@ impl Attacker {
         frame
     }
 
-    /// Draws an attack with random bytes in a COBS frame. The frame's length determines the counter that it must
-    /// increment.
+    /// Draws an attack with random bytes in a COBS frame.
+    ///
+    /// The frame's length determines the counter that the receiver must increment.
     fn noise(&mut self, to: u16, port: Port) -> Attack {
         let len = self.rng.random_range(1..300);
         let bytes: Vec<u8> = (0..len).map(|_| self.rng.random()).collect();

@@ -67,11 +67,13 @@ pub(crate) struct Net {
     pub(crate) handshakes: Vec<usize>,
     /// Number of genuine messages that each relay has received since its start.
     pub(crate) genuine: Vec<u32>,
-    /// Start counts of sender and receiver when a message was last accepted, by link (sender, receiver).
-    pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Start counts of sender and receiver when a frame last arrived, by link (sender, receiver).
+    /// Start counts of sender and receiver when the receiver last accepted a message.
     ///
-    /// The count of the sender is from the time when the frame was sent.
+    /// The key is the link: sender, receiver.
+    pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
+    /// Start counts of sender and receiver when the receiver last received a frame.
+    ///
+    /// The key is the link: sender, receiver. The start count of the sender is from the time when the frame was sent.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
     /// Indices of recorded frames that were signed before their sender knew of the receiver's last start.
     outdated: BTreeSet<usize>,
@@ -83,7 +85,7 @@ pub(crate) struct Net {
 }
 
 impl Net {
-    /// Starts `relays` relays at time 0. The events `events`, with times in ms, must be in order of time.
+    /// Starts `relays` relays at time 0. `events`, with times in ms, must be in ascending order of time.
     pub(crate) fn new(relays: u16, wiring: Wiring, events: &[(u64, ScheduledEvent)]) -> Self {
         let mut net = Self {
             relays: (1..=relays)
@@ -162,7 +164,7 @@ impl Net {
             .is_none_or(|(_, next)| heard.number < *next)
     }
 
-    /// Returns true if the receiver still uses the nonces of a recorded frame's tag.
+    /// Returns true if the tag of a recorded frame has the nonces that the receiver still uses.
     pub(crate) fn is_of_current_starts(&self, heard: &RecordedFrame) -> bool {
         let RecordedFrame {
             from,
@@ -287,7 +289,7 @@ impl Net {
         }
     }
 
-    /// Delivers bytes to relay `to`. Returns the number of frames that it sends in response.
+    /// Delivers bytes to relay `to`. Returns the number of frames that the relay sends in response.
     pub(crate) fn deliver_bytes(&mut self, to: u16, port: Port, wire: &[u8]) -> usize {
         let now = self.now;
         self.relay(to).handle_bytes(now, port, wire);
@@ -368,12 +370,12 @@ fn proof(epoch: u32) -> Auth {
     }
 }
 
-/// Creates relay `index` of `of` relays. `start` has its epoch and the current time.
+/// Creates relay `index` of `of` relays. `start` is the relay's epoch and the current time.
 pub(crate) fn relay(of: u16, index: u16, wiring: Wiring, start: (u32, Instant)) -> Relay {
     started(of, index, wiring, start, None)
 }
 
-/// Creates relay `index` of `of` relays with the mission upload that it had stored, if any.
+/// Creates relay `index` of `of` relays; `stored` is the mission upload from its earlier start, if any.
 fn started(
     of: u16,
     index: u16,

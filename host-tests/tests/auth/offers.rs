@@ -28,8 +28,9 @@ fn offered(relays: u16, version: u16) -> Vec<u8> {
 }
 
 impl Attacker {
-    /// Returns the relay to attack with a frame that was recorded on its way to node `to`. Returns `None` if that
-    /// node is not a relay.
+    /// Returns the relay to attack with a recorded frame whose receiver was node `to`.
+    ///
+    /// Returns `None` if the frame is not for a relay.
     pub(crate) fn target(&mut self, net: &Net, kind: Kind, to: u16) -> Option<u16> {
         if kind == Kind::OfferReplayed && self.rng.random_bool(0.5) {
             return Some(self.rng.random_range(1..=net.len()));
@@ -46,8 +47,7 @@ impl Attacker {
 
     /// Returns a forged mission offer, or any message that claims to come from the ground station.
     ///
-    /// The values are sender, receiver and frame. Returns `None` if the frame would be an unchanged copy of a
-    /// recorded frame.
+    /// The result is sender, receiver and frame; `None` if the frame would be an unchanged copy of a recorded frame.
     pub(crate) fn pretended(
         &mut self,
         net: &Net,

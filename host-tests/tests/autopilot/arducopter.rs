@@ -38,7 +38,7 @@ fn an_ignored_target_is_repeated_and_then_reported() {
     assert!(vehicle.events.contains(&AutopilotEvent::Refused));
 }
 
-/// Checks that an autopilot is not reported as refusing targets if its messages about the target stop.
+/// Checks that an autopilot that stops reporting its target is not reported as refusing targets.
 #[test]
 fn stopped_streams_do_not_count_as_a_refused_target() {
     let mut vehicle = Vehicle::flying(Kind::ArduCopter);
@@ -82,9 +82,9 @@ fn the_target_is_sent_again_after_a_mode_change() {
     assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
 }
 
-/// Checks that the last target of a flight has no velocity, no matter when the autopilot confirms it.
+/// Checks that the last target of a flight has no velocity, whenever the autopilot confirms the target.
 ///
-/// Each of the 100 flights has another time of confirmation.
+/// The time of the confirmation differs between the 100 flights.
 #[test]
 fn a_late_confirmation_of_the_last_target_counts() {
     for late in 0..100_u16 {

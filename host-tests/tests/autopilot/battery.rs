@@ -49,10 +49,12 @@ impl Vehicle {
     }
 }
 
-/// Flight time of these drones to their home position, s: 200 m at 5 m/s, 10 m down at 1.5 m/s.
+/// Flight time of the drones in these tests to their home position, s.
+///
+/// The way is 200 m at 5 m/s and 10 m down at 1.5 m/s.
 const HOME_S: u16 = 46;
 
-/// Relay and its vehicle. They exchange data in every step of the simulation.
+/// Relay and its vehicle, which exchange data in every step of the simulation.
 struct Pair {
     vehicle: Vehicle,
     relay: Relay,
@@ -93,15 +95,18 @@ impl Pair {
             .exchange(&mut self.relay, self.vehicle.now);
     }
 
-    /// Returns the relay's endurance and its limit, s; `None` if unknown. Below the limit the relay requests to leave.
+    /// Returns the relay's endurance, and the limit below which the relay requests to leave, s.
+    ///
+    /// Endurance is the remaining flight time. A value is `None` if it is unknown.
     fn told(&mut self) -> [Option<u16>; 2] {
         self.exchange();
         let now = self.vehicle.now;
         [self.relay.endurance_s(now), self.relay.endurance_limit_s()]
     }
 
-    /// Runs for up to `seconds`, and calls `send` before each second. Returns the second in which `until` becomes true. `None` if it does
-    /// not become true.
+    /// Runs for up to `seconds`, and calls `send` before each second.
+    ///
+    /// Returns the first second after which `until` is true; `None` if `until` stays false.
     fn run(
         &mut self,
         seconds: u16,
@@ -170,7 +175,9 @@ fn the_time_of_a_px4_counts_in_flight() {
     assert_eq!(told, Some(360 + 110), "200 m at 2 m/s, 10 m at 1 m/s");
 }
 
-/// Checks that a relay reserves twelve times `dead_after` for its replacement, but at most 4 min.
+/// Checks that a relay reserves twelve times `dead_after`, at most 4 min, for its replacement.
+///
+/// The reserved time is a part of the endurance (remaining flight time).
 #[test]
 fn the_time_of_a_replacement_is_capped() {
     for (dead_after_ms, replacement_s) in [(5_000, 60), (15_000, 180), (20_000, 240), (75_000, 240)]
@@ -189,7 +196,7 @@ fn the_time_of_a_replacement_is_capped() {
     }
 }
 
-/// Checks that the endurance is unknown if the home position is unknown or far from the line.
+/// Checks that the endurance is unknown if the home position is unknown or far from the line Tx-Rx.
 #[test]
 fn without_a_home_the_endurance_is_unknown() {
     let mut pair = Pair::new(Vehicle::flying(Kind::Px4), 1, 1);
@@ -225,7 +232,9 @@ fn an_invalid_percentage_is_unknown() {
     }
 }
 
-/// Checks that without a reported time the endurance is a percentage of the configured flight time. ArduCopter reports only the percentage.
+/// Checks that the endurance is a percentage of the configured flight time if no time is reported.
+///
+/// ArduCopter reports only the percentage.
 #[test]
 fn a_percentage_counts_by_the_time_of_a_full_battery() {
     let send: [fn(&mut Vehicle, i8); 2] = [
@@ -295,7 +304,9 @@ fn a_relay_with_a_low_battery_requests_to_leave() {
     assert_eq!(pair.relay.endurance_s(pair.vehicle.now), None);
 }
 
-/// Checks that an unknown endurance is reported when the relay takes control, and then once a minute. The endurance was never known here.
+/// Checks that an endurance that was never known is reported as unknown at the start of control.
+///
+/// The report is repeated once a minute.
 #[test]
 fn an_endurance_that_was_never_known_is_told_at_the_start_of_control() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -313,9 +324,9 @@ fn an_endurance_that_was_never_known_is_told_at_the_start_of_control() {
     }
 }
 
-/// Checks that a status text every 5 s tells the pilot to leave when only the reserve is left.
+/// Checks that a status text tells the pilot every 5 s to leave when only the reserve is left.
 ///
-/// The chain has refused the departure. The text stops when the pilot takes control.
+/// The chain has refused the relay's departure. The text stops when the pilot takes control.
 #[test]
 fn the_pilot_is_told_to_leave_at_the_last_reserve() {
     const LEAVE: &str = "battery: leave now";
@@ -398,10 +409,10 @@ fn the_last_endurance_counts_down() {
     }
 }
 
-/// Checks that without new messages the endurance counts down from the last confirmed value. A value is confirmed if it agrees with the
-/// value before it.
+/// Checks that without new messages the endurance counts down from the last confirmed value.
 ///
-/// If there is only one value, the countdown starts from that value.
+/// A value is confirmed if it agrees with the previous value. If there is only one value, the countdown starts from
+/// that value.
 #[test]
 fn the_last_confirmed_endurance_counts_down() {
     // Seconds at which the relay requests to leave, and reaches its reserve.
@@ -434,7 +445,9 @@ fn the_last_confirmed_endurance_counts_down() {
     assert_eq!(silence(relay, 61), [Some(916), Some(1_095)]);
 }
 
-/// Checks that a relay acts on a low or high endurance only after 15 s. Repeated operator orders do not delay the detection of the reserve.
+/// Checks that a relay acts on a low or high endurance only after it has lasted 15 s.
+///
+/// Repeated operator orders do not delay the detection that only the reserve is left.
 #[test]
 fn each_decision_takes_its_time() {
     let mut relay = shared(1, 1);
@@ -460,7 +473,9 @@ fn each_decision_takes_its_time() {
     }
 }
 
-/// Checks that an order to stay holds until half of the endurance beyond the way home is used up.
+/// Checks that an operator's order to stay holds until half of the spare endurance is used up.
+///
+/// Spare is the endurance beyond the way home.
 #[test]
 fn the_operators_order_to_stay_holds() {
     let mut relay = shared(1, 1);
@@ -488,7 +503,9 @@ fn the_operators_order_to_stay_holds() {
     assert_eq!(fly(&mut relay, 903, 904), None);
 }
 
-/// Runs `relay` from second `from` to `to`. Returns its departure state at the end. The endurance is `left_s`, the way home takes no time.
+/// Runs `relay` from second `from` to `to`, and returns the relay's departure state at the end.
+///
+/// The endurance is `left_s`, and the flight home takes no time.
 fn fly(relay: &mut Relay, from: u64, to: u64, left_s: f32) -> Departure {
     for s in from..to {
         relay.handle_timeout(at(s));
@@ -499,9 +516,9 @@ fn fly(relay: &mut Relay, from: u64, to: u64, left_s: f32) -> Departure {
     relay.departure(at(to))
 }
 
-/// Checks that a spare or a just started relay stays outside of the chain after 15 s of low endurance.
+/// Checks that a spare relay or a just started relay stays outside of the chain with a low endurance.
 ///
-/// The relay returns to its former state once the endurance has been high for 15 s.
+/// The endurance must be low for 15 s. The relay returns to its former state after 15 s of high endurance.
 #[test]
 fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
     for is_spare in [true, false] {
@@ -550,7 +567,9 @@ fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
     }
 }
 
-/// Checks that a relay that left the chain at its reserve returns only after 15 s of high endurance.
+/// Checks that one high endurance value does not return a relay that left the chain at its reserve.
+///
+/// The relay returns only after 15 s of high endurance.
 #[test]
 fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     let mut relay = shared(3, 2);
@@ -568,7 +587,7 @@ fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     assert!(!relay.is_at_reserve());
 }
 
-/// Checks that a landing and a take-off do not bring a relay with a low battery back into the chain.
+/// Checks that landing and taking off do not bring a relay with a low battery back into the chain.
 ///
 /// The relay rejoins only after 15 s of high endurance.
 #[test]
@@ -620,7 +639,9 @@ fn a_restarted_autopilot_has_no_home() {
     assert!(pair.relay.endurance_s(pair.vehicle.now).is_some());
 }
 
-/// Checks that the link requests battery messages only while none arrive, at first or later.
+/// Checks that the link requests battery messages while none arrive.
+///
+/// This holds both at the start and after the messages have stopped.
 #[test]
 fn messages_of_the_battery_are_requested_while_they_are_missing() {
     let mut pair = Pair::flying(Kind::ArduCopter);
@@ -645,7 +666,7 @@ fn messages_of_the_battery_are_requested_while_they_are_missing() {
     assert!(then[0] > first[0] && then[1] > first[1], "{then:?}");
 }
 
-/// Checks that despite an order to stay, the pilot is told of the reserve once a minute.
+/// Checks that the pilot is told once a minute of the reached reserve, in spite of an order to stay.
 #[test]
 fn an_order_to_stay_does_not_silence_the_reserve() {
     const RESERVE: &str = "battery: at the reserve";
@@ -728,8 +749,9 @@ fn a_way_home_from_an_old_position_is_unknown() {
     assert_eq!(pair.told()[0], None);
 }
 
-/// Checks that setpoint control ends if a PX4 sends only battery messages for 0.84 s. After such a silence the PX4 may be in a failsafe, so
-/// the pilot must choose the mode once more.
+/// Checks that setpoint control ends if a PX4 sends only battery messages for 0.84 s.
+///
+/// After such a silence the PX4 may be in a failsafe, so the pilot must choose the mode again.
 #[test]
 fn messages_of_the_battery_hide_no_silence_of_a_px4() {
     // The phase shifts the link's TIMESYNC requests. In some phases no reply is late, and the link notices only the
@@ -756,8 +778,9 @@ fn messages_of_the_battery_hide_no_silence_of_a_px4() {
     }
 }
 
-/// Checks that a relay cancels its request to leave after 15 s of sufficient endurance. Sufficient is 30 s above the limit. A request by
-/// the firmware is not cancelled.
+/// Checks that a relay cancels its request to leave after 15 s of sufficient endurance.
+///
+/// Sufficient is 30 s above the limit for leaving. A request by the firmware is not cancelled.
 #[test]
 fn a_request_ends_once_the_endurance_has_recovered() {
     let mut relay = shared(1, 1);
@@ -772,7 +795,9 @@ fn a_request_ends_once_the_endurance_has_recovered() {
     assert_ne!(fly(&mut relay, 77, 200, 900.0), Departure::Member);
 }
 
-/// Checks that an endurance that is unknown every second time is reported once a minute. A value of six hours or more counts as unknown.
+/// Checks that an endurance that is unknown in every second value is reported only once a minute.
+///
+/// A value of six hours or more counts as unknown.
 #[test]
 fn alternating_values_are_told_once_a_minute() {
     let mut relay = shared(1, 1);
@@ -791,7 +816,9 @@ fn alternating_values_are_told_once_a_minute() {
     assert_eq!(relay.endurance_s(at(242)), Some(21_500));
 }
 
-/// Checks that a relay without a reserve never leaves by itself. Its endurance is shown; an unknown endurance is not reported.
+/// Checks that a relay without a reserve never leaves by itself.
+///
+/// Its endurance is shown, but an unknown endurance is not reported.
 #[test]
 fn without_a_reserve_the_endurance_is_only_shown() {
     for kind in [Kind::Px4, Kind::ArduCopter] {

@@ -28,8 +28,9 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
     })
 }
 
-/// Returns results and recipients of the companion's answers to `MAV_CMD_USER_1`. By this command an operator reports
-/// lost drones as gone.
+/// Returns the result and the recipient of each of the companion's answers to `MAV_CMD_USER_1`.
+///
+/// By this command an operator reports that lost drones are gone.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.received.iter();
     said.filter_map(|(_, said)| match said {
@@ -99,8 +100,9 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
     }
 }
 
-/// Checks that the second of two commands that arrive together is ignored until it is repeated. A cable or a router
-/// can deliver two commands together.
+/// Checks that the second of two simultaneous operator commands is ignored until it is repeated.
+///
+/// A cable or a router can deliver two commands together.
 #[test]
 fn simultaneous_commands_are_obeyed_in_sequence() {
     let mut vehicle = Vehicle::flying(Kind::Px4);

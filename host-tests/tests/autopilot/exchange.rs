@@ -34,7 +34,7 @@ pub(crate) fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Returns a copy of the autopilot link `link` to which the relay's outputs were passed once more.
+/// Returns a copy of the autopilot link `link` after the relay's outputs were passed to the copy again.
 ///
 /// If the copy equals `link`, then `link` already had the newest outputs of the relay.
 fn with_repeated_outputs(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
@@ -170,8 +170,9 @@ fn the_yaw_points_an_antenna_to_the_neighbour() {
     }
 }
 
-/// Checks that the autopilot link gives the radio's noise sample to the relay. The test's relay does not measure
-/// interference, so that it counts the sample as rejected.
+/// Checks that the autopilot link passes the radio's noise sample to the relay.
+///
+/// The relay of this test does not measure interference, so it counts the sample as rejected.
 #[test]
 fn exchange_passes_the_radios_noise_to_the_relay() {
     let (mut vehicle, mut relay) = flies(Kind::ArduCopter, Settings::default());
@@ -187,8 +188,8 @@ fn exchange_passes_the_radios_noise_to_the_relay() {
 
 /// Exchanges frames between two neighbouring relays with motion guards.
 ///
-/// If `is_silent` is true, the second relay neither receives nor sends frames. The second relay's drone starts at x =
-/// `start_m`, and is always at its setpoint once it has one.
+/// The second relay's drone is at the relay's setpoint, or at x = `start_m` before the first setpoint. If `is_silent`
+/// is true, the second relay neither receives nor sends frames.
 fn exchange_fences(
     first: &mut Relay,
     second: &mut Relay,
@@ -258,7 +259,7 @@ fn exchange_passes_an_operators_clearance_to_the_relay() {
     assert!(format!("{first:?}") == format!("{expected:?}"));
 }
 
-/// Checks that a relay's bearings lead to its neighbour's agreed position, and to the transmitter.
+/// Checks that a relay's bearings point to its neighbour's agreed position and to the transmitter.
 #[test]
 fn bearings_lead_to_the_neighbours_agreed_position() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
@@ -287,7 +288,9 @@ fn bearings_lead_to_the_neighbours_agreed_position() {
     assert!((back.distance_m - ahead.distance_m).abs() < 0.1, "{back:?}");
 }
 
-/// Checks that a drone on the wrong side of its neighbour cannot come under setpoint control.
+/// Checks that a drone comes under setpoint control only on the right side of its neighbour's drone.
+///
+/// The order along the line from Tx to Rx must be that of the relays in the chain.
 #[test]
 fn a_drone_out_of_sequence_cannot_be_engaged() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));

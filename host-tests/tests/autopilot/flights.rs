@@ -81,7 +81,7 @@ impl Cable {
     }
 }
 
-/// Companion computer under test: the autopilot link that is polled, or the asynchronous runner.
+/// Companion under test: the autopilot link, which the test polls, or the asynchronous runner.
 enum Companion {
     Polled(Box<Autopilot>),
     Async(Runner),
@@ -343,7 +343,7 @@ impl Flight {
         engages
     }
 
-    /// Passes a frame of the companion to the vehicle, and checks the status texts in it.
+    /// Passes a frame of the companion to the vehicle. Checks the status text if the frame contains one.
     fn send(&mut self, frame: &[u8]) {
         let now = self.now;
         if frame[7] == 253 {
@@ -370,8 +370,10 @@ impl Flight {
     }
 }
 
-/// Simulates a random flight. Returns the violated rules, how often setpoint control was engaged, and true if the
-/// asynchronous runner flew it.
+/// Simulates a random flight.
+///
+/// Returns the violated rules, the number of times that setpoint control was engaged, and true if the companion was the
+/// asynchronous runner.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

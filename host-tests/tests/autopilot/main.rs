@@ -56,7 +56,7 @@ fn an_autopilot_is_found_and_its_messages_requested() {
     }
 }
 
-/// Checks that polling at the last representable instants yields few frames, so that a poll loop ends.
+/// Checks that polling at the last representable times yields only a few frames, so that a loop ends.
 #[test]
 fn poll_transmit_ends_at_the_latest_instant_too() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -238,7 +238,7 @@ fn a_withdrawn_setpoint_is_not_flown_again() {
     assert!(last.0 > stopped.0);
 }
 
-/// Checks that a setpoint that is not finite or too far away does not end the stream of targets.
+/// Checks that targets continue after a setpoint that is not finite or is too far away.
 #[test]
 fn a_drone_without_a_setpoint_holds_until_the_next_one() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -256,7 +256,7 @@ fn a_drone_without_a_setpoint_holds_until_the_next_one() {
     }
 }
 
-/// Checks that targets have no yaw if the bearing for the antenna is not a valid angle.
+/// Checks that targets have no yaw if the bearing of the antenna is not a valid angle.
 #[test]
 fn a_bearing_of_none_is_left_out() {
     use uav_relay::pointing::Bearing;
@@ -281,7 +281,9 @@ fn a_bearing_of_none_is_left_out() {
     }
 }
 
-/// Checks that no targets are sent for a relay that is not ready, so that a PX4 refuses OFFBOARD.
+/// Checks that a relay that is not ready sends its autopilot no targets.
+///
+/// A PX4 therefore refuses OFFBOARD.
 #[test]
 fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
@@ -303,7 +305,9 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     assert!(vehicle.targets_since(from).len() > 20, "it stays engaged");
 }
 
-/// Checks that a new membership view or mission is reported to the operator once. Only drones in flight report it.
+/// Checks that a new membership view or mission is reported to the operator only once.
+///
+/// Only a relay whose drone is in flight reports it.
 #[test]
 fn a_view_and_a_mission_are_reported_to_the_operator_once() {
     use uav_relay::Event;
@@ -359,9 +363,9 @@ fn a_view_and_a_mission_are_reported_to_the_operator_once() {
     assert_eq!(texts_since(&vehicle, from), ["relay: new mission adopted"]);
 }
 
-/// Checks that a reason for which a drone waits is not reported to the operator if it lasts only 1.8 s.
+/// Checks that the reason for a drone's waiting is not reported to the operator if it lasts only 1.8 s.
 ///
-/// Such reasons come and go while an agreement spreads along the chain. A reason that persists is reported.
+/// Such reasons come and go while an agreement spreads along the chain. A lasting reason is reported.
 #[test]
 fn a_short_hold_reason_is_not_reported() {
     use uav_relay::HoldReason::Close;

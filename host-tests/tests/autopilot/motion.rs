@@ -148,8 +148,9 @@ fn the_set_speed_and_position_are_not_exceeded() {
     }
 }
 
-/// Checks that a drone stops smoothly when its setpoint is withdrawn in flight. It flies at most 0.5 m past the old
-/// setpoint, and less than 1 m back to the position where it stops.
+/// Checks that a drone stops smoothly when its setpoint is withdrawn in flight.
+///
+/// The drone passes the position at which it stops by less than 1 m, and the old setpoint by less than 0.5 m.
 #[test]
 fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -176,7 +177,9 @@ fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     }
 }
 
-/// Checks that a drone flies on by less than 0.5 m after the stopping time that its guard assumes.
+/// Checks that a drone has stopped after the stopping time that its motion guard assumes.
+///
+/// The drone flies on by less than 0.5 m after that time.
 #[test]
 fn a_drone_has_stopped_after_the_stopping_time() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -300,8 +303,9 @@ fn a_wrong_clock_stops_positions_for_seconds_at_most() {
     }
 }
 
-/// Checks that the relay keeps control of the drone when the autopilot halts for 1.5 s. The autopilot's clock stands
-/// still meanwhile, so that it is 1.5 s late afterwards.
+/// Checks that the relay keeps control of the drone when the autopilot halts for 1.5 s.
+///
+/// The autopilot's clock stops for that time, and is 1.5 s slow afterwards.
 #[test]
 fn a_short_pause_of_the_autopilot_ends_no_flight() {
     for echoes in [true, false] {
@@ -331,7 +335,7 @@ fn a_short_pause_of_the_autopilot_ends_no_flight() {
     }
 }
 
-/// Checks that messages that never arrive are requested only a few times in ten minutes of flight.
+/// Checks that the link requests messages that never arrive only a few times in ten minutes of flight.
 #[test]
 fn requests_of_absent_messages_end() {
     for (kind, most) in [(Kind::Px4, 2), (Kind::ArduCopter, 9)] {
@@ -348,9 +352,9 @@ fn requests_of_absent_messages_end() {
     }
 }
 
-/// Checks that the link reports an ArduCopter that has breached its fence and returns to launch.
+/// Checks that the link reports an ArduCopter that has breached its geofence and returns to launch.
 ///
-/// The drone breaches the fence because it follows a moving target.
+/// The drone breaches the geofence because it follows a moving target.
 #[test]
 fn a_fence_breach_by_a_moving_target_is_named() {
     let mut rig = Rig::new(Kind::ArduCopter);
@@ -369,7 +373,7 @@ fn a_fence_breach_by_a_moving_target_is_named() {
     assert_eq!(rig.text_count("relay: released, returns (RTL): fence"), 1);
 }
 
-/// Checks that a drone flies on by less than 40 m if its pilot gives up control at full speed. Then the drone must stop.
+/// Checks that a drone stops within 40 m if its pilot hands control to the relay at full speed.
 #[test]
 fn a_drone_handed_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -392,7 +396,7 @@ fn a_drone_handed_back_at_full_speed_stops() {
     }
 }
 
-/// Checks that positions half a second older than stated do not make the drone exceed its speed limit.
+/// Checks that a drone keeps its speed limit if its positions are 0.5 s older than their time stamps.
 #[test]
 fn late_positions_do_not_disturb_the_flight() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -411,9 +415,9 @@ fn late_positions_do_not_disturb_the_flight() {
     }
 }
 
-/// Checks that a drone that drifts while the link has no position is led from its true position later.
+/// Checks that the link leads a drone from its true position after the drone has drifted.
 ///
-/// The next flight targets must begin at the drone's new position.
+/// The drone drifts while the link receives no position. The next targets must begin at the drone's new position.
 #[test]
 fn a_drone_that_drifted_is_led_from_its_true_position() {
     let mut rig = Rig::new(Kind::ArduCopter);

@@ -23,7 +23,7 @@ const RESUMES: Duration = Duration::from_millis(1_200);
 /// Longest time until the companion knows of a PX4's failsafe: heartbeat interval and link delay.
 const KNOWN_WITHIN: Duration = Duration::from_millis(1_300);
 
-/// Time for which an ArduCopter keeps flying at its target velocity without new targets.
+/// Time for which an ArduCopter keeps its target velocity without new targets.
 const VELOCITY: Duration = Duration::from_millis(3_000);
 /// Time for which an ArduCopter continues to navigate after the loss of GPS.
 const RECKONS: Duration = Duration::from_millis(8_000);
@@ -37,7 +37,9 @@ pub(crate) enum Mode {
     Land,
 }
 
-/// Controller gains (PX4's MPC_XY_P, MPC_XY_VEL_P_ACC, _I_ACC, _D_ACC) and air drag of a vehicle.
+/// Air drag and controller gains of a vehicle.
+///
+/// The gains are PX4's MPC_XY_P, MPC_XY_VEL_P_ACC, MPC_XY_VEL_I_ACC and MPC_XY_VEL_D_ACC.
 struct Gains {
     place: f64,
     speed: f64,
@@ -131,25 +133,25 @@ pub(crate) struct Real {
     pub(crate) is_critical: bool,
     pub(crate) gps: bool,
     gps_lost_at: Instant,
-    /// x beyond which an ArduCopter ignores targets, m.
+    /// Position x of the fence, m. An ArduCopter ignores targets beyond this x.
     pub(crate) fence_x_m: f64,
     pub(crate) is_breached: bool,
     target: Option<SentTarget>,
     last_target_at: Option<Instant>,
     stream_since: Instant,
-    /// Point at which the drone hovers in the autopilot's own modes.
+    /// Point at which the drone hovers in the flight modes without a companion.
     hold: Point,
     began: Instant,
     pub(crate) away_until: Option<Instant>,
     /// Fraction by which the autopilot's clock runs slow since `slow_since`.
     pub(crate) slow: f64,
     slow_since: Instant,
-    /// Time that the autopilot's clock has lost by a step, µs; negative if it has gained time.
+    /// Time that the autopilot's clock has lost all at once, µs; negative if the clock has gained time.
     pub(crate) lost_us: i64,
     pub(crate) echoes: bool,
     /// True while the autopilot sends no positions.
     pub(crate) is_mute_of_positions: bool,
-    /// Number of simulation steps by which positions are older than their time stamps state.
+    /// Additional age of the positions that their time stamps do not show, simulation steps.
     pub(crate) hidden_lag: usize,
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,
@@ -160,7 +162,7 @@ pub(crate) struct Real {
     sent_at: Instant,
     /// Number of times that a PX4 resumed OFFBOARD because the companion sent targets in a failsafe.
     ///
-    /// A failsafe counts only if the companion already knew of it.
+    /// Only failsafes of which the companion already knew are counted.
     pub(crate) resumed: u32,
     /// Number of times that a PX4 resumed OFFBOARD before the companion knew of the failsafe.
     pub(crate) resumed_late: u32,
@@ -367,7 +369,7 @@ impl Real {
         }
     }
 
-    /// Flies the drone for one step as its pilot does by the sticks, at `velocity` in m/s.
+    /// Flies the drone for one step at `velocity`, m/s, as if the pilot used the sticks.
     ///
     /// The drone has that velocity at once.
     pub(crate) fn shove(&mut self, velocity: Point) {

@@ -14,8 +14,9 @@ use uav_relay::asynch::{AsyncAutopilot, AsyncRelay, Clock};
 use uav_relay::flight::autopilot::Autopilot;
 use uav_relay::{Instant, Settings};
 
-/// Number of polls of the asynchronous runner per time step. They suffice for a received frame, a turn of the loop
-/// and a dozen sent frames.
+/// Number of polls of the asynchronous runner per time step.
+///
+/// The polls suffice for a received frame, an iteration of the runner's loop and a dozen sent frames.
 const POLLS: u32 = 64;
 
 #[derive(Clone)]

@@ -13,7 +13,7 @@ pub(crate) const OTHER: [u8; 32] = [8; 32];
 /// Signing time stamp of the year 2026, in MAVLink's unit of 10 µs.
 const STAMP: u64 = 37_527_840_000_000;
 
-/// Signing key of the simulated autopilot, with its time stamps.
+/// Signing key of the simulated autopilot, with the time stamps of its signatures.
 pub(crate) struct Key {
     bytes: [u8; 32],
     /// Signing time stamp at the simulated autopilot's start.
@@ -83,7 +83,9 @@ fn mistrust(vehicle: &Vehicle) -> Vec<Mistrust> {
     .collect()
 }
 
-/// Creates a simulated vehicle that signs with `theirs`, connected to a link that signs with `ours`.
+/// Creates a simulated vehicle that signs with the key `theirs`, and its autopilot link.
+///
+/// The autopilot link signs with the key `ours`.
 pub(crate) fn keyed(kind: Kind, ours: Option<[u8; 32]>, theirs: Option<[u8; 32]>) -> Vehicle {
     let mut vehicle = Vehicle::new(kind);
     vehicle.key = theirs.map(Key::new);
@@ -132,8 +134,9 @@ fn a_wrong_key_is_reported_once_and_prevents_the_flight() {
     }
 }
 
-/// Checks that two heartbeats in a row with a wrong signature raise no event. Another vehicle or noise may cause
-/// them.
+/// Checks that two successive heartbeats with a wrong signature raise no event.
+///
+/// Another vehicle or noise may have caused them.
 #[test]
 fn a_single_frame_with_a_wrong_signature_is_no_event() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));

@@ -88,7 +88,7 @@ impl Target {
 pub(crate) enum Mode {
     /// The pilot flies the drone by the sticks.
     Position,
-    /// The autopilot holds the position, flies its mission or returns.
+    /// The autopilot flies by itself: it holds the position, flies its own mission or returns.
     Hold,
     /// OFFBOARD (PX4) or GUIDED (ArduCopter): the drone follows the companion's targets.
     Companion,
@@ -208,8 +208,9 @@ impl Vehicle {
         self.drive();
     }
 
-    /// Simulates one time step of the flight, and sends messages to the link. The link answers in
-    /// [`drive`](Self::drive) or [`answer`](Self::answer).
+    /// Simulates one time step of the flight, and sends messages to the autopilot link.
+    ///
+    /// The autopilot link answers in [`drive`](Self::drive) or [`answer`](Self::answer).
     pub(crate) fn step_without_exchange(&mut self) {
         self.now = Instant::from_micros(self.now.as_micros() + STEP_MS * 1_000);
         let ms = self.now.as_micros() / 1_000;
@@ -373,7 +374,7 @@ impl Vehicle {
         self.send_from([SYSTEM, 1], message);
     }
 
-    /// Sends the link a message with the address of a ground station or of another component.
+    /// Sends the link a message from another MAVLink address, for example that of a ground station.
     pub(crate) fn send_from(&mut self, [system, component]: [u8; 2], message: &MavMessage) {
         let header = MavHeader {
             system_id: system.into(),

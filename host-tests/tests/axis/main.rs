@@ -9,7 +9,7 @@ use serde::Deserialize;
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
 
-/// Pairs of a line's length, m, and the largest permitted error of x and y on such a line, m.
+/// Accuracy limits: length of a line, m, and largest permitted error of x and y on this line, m.
 const ALLOWED: [(f64, f64); 3] = [(1e3, 1e-3), (1e4, 1e-3), (1e5, 5e-3)];
 
 const LINES: usize = 10_000;
@@ -60,8 +60,9 @@ impl Beside {
         (line, length)
     }
 
-    /// Returns the crate's errors for this line and point, m: length of the line, x and y of the point. Rounding to
-    /// f32 does not count.
+    /// Returns the crate's errors for this line and point, m: length of the line, x and y of the point.
+    ///
+    /// The error by the rounding of x and y to f32 is subtracted.
     fn off(&self) -> [f64; 3] {
         let axis = self.axis();
         let place = axis.place(ground(self.lat, self.lon)).unwrap();
@@ -92,7 +93,9 @@ impl Line {
         [lat, lon, azimuth]
     }
 
-    /// Returns x and y of a point: its distances along the line and to its side, m. The search for x begins at `x`.
+    /// Returns x and y of a point, m: its distances along the line and to the side of the line.
+    ///
+    /// The search for x begins at the argument `x`.
     fn foot(&self, lat: f64, lon: f64, mut x: f64) -> [f64; 2] {
         let mut y = 0.0;
         for _ in 0..20 {
@@ -229,7 +232,7 @@ fn the_round_trip_of_a_position_is_exact_to_one_unit() {
     }
 }
 
-/// Returns the distance from a point to the nearest point of the line, m, by geodesics.
+/// Returns the geodesic distance from a point to the nearest point of the line, m.
 fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
     let apart = |x: f64| -> f64 {
         let [at_lat, at_lon, _] = line.at(x);
@@ -251,8 +254,9 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Largest permitted relative errors of a point's distance from a line, as pairs (d, e). The error e is for points up
-/// to d metres from the line's middle.
+/// Pairs (d, e): e is the largest permitted relative error of a point's distance from a line.
+///
+/// The error e is for points up to d metres from the middle of the line.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
 #[test]

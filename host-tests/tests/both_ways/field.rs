@@ -13,8 +13,9 @@ use super::shares::Shares;
 
 const KINDS: [&str; 3] = ["even", "random points", "interferers"];
 
-/// Checks that agreed positions in random fields of interference match those of a reference search. At least 99.5 % of the SIRs must be
-/// within 1e-4 of the reference search's SIR, and all within 1 %.
+/// Checks that agreed positions in random interference fields are as good as a reference search's.
+///
+/// At least 99.5 % of the SIRs must be within 1e-4 of the reference search's SIR, and all within 1 %.
 #[test]
 fn the_best_places_in_a_field_are_found() {
     let mut rng = generator(3321);
@@ -48,8 +49,9 @@ fn the_best_places_in_a_field_are_found() {
     }
 }
 
-/// Checks that a chain in a field of interference agrees on the positions computed without messages. The agreed
-/// positions must be equal to the bit.
+/// Checks that a chain in a field of interference agrees on the positions computed without messages.
+///
+/// The positions must be equal to the bit.
 #[test]
 fn a_chain_in_a_field_agrees_on_its_silent_places() {
     let mut rng = generator(3322);

@@ -50,7 +50,7 @@ fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
 
 /// Checks that missions with different requirements for the return direction have different digests.
 ///
-/// For this reason relays with such missions do not form a chain. The requirements are `reverse` and the power of Rx.
+/// The requirements are `reverse` and the power of Rx. Relays with different mission digests form no chain.
 #[test]
 fn relays_with_other_ways_back_do_not_form_a_chain() {
     let mut rng = generator(3307);

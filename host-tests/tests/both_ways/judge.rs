@@ -17,8 +17,9 @@ pub(crate) struct Chain {
     pub(crate) interferer: [f64; 3],
     /// Further interferers, each with its power in W, and its x and y in m.
     pub(crate) others: Vec<[f64; 3]>,
-    /// Points of a field of interference that replaces the interferer: x in m, and Upsilon = E[1/I] in 1/W. I is the
-    /// interference power. The list is empty if there is an interferer.
+    /// Field of interference, as points: x in m, and Upsilon = E[1/I] in 1/W; I is the interference power.
+    ///
+    /// The field replaces the interferer. The list is empty if there is an interferer.
     pub(crate) field: Vec<[f64; 2]>,
     /// Path-loss factors, 1/m^2. First the factor of links with a drone at one or both ends; second that of links on the ground.
     pub(crate) loss: [f64; 2],
@@ -28,10 +29,12 @@ pub(crate) struct Chain {
     pub(crate) reverse: f64,
 }
 
-/// Number of equal intervals in the grid of the first search.
+/// Number of equal intervals in the grid with which the search begins.
 const GRID: usize = 300;
 
-/// Number of grid points in a refinement around a relay's position. Odd, so that the position is one of them.
+/// Number of grid points with which the search refines a relay's position.
+///
+/// It is odd, so that the present position is one of the grid points.
 const WINDOW: usize = 15;
 
 impl Chain {
@@ -155,7 +158,9 @@ impl Chain {
         places.map(|(grid, &at)| grid[at]).collect()
     }
 
-    /// Returns the x values of the first search's grid, m. The grid is dense near the interferer, Tx and Rx.
+    /// Returns the x values of the grid with which the search begins, m.
+    ///
+    /// The grid is dense near the interferer, Tx and Rx.
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
         // The minimum separation is a whole number of steps.
@@ -207,8 +212,9 @@ impl Chain {
         (value, x)
     }
 
-    /// Returns the best SIR of the worst hop that the whole search finds, and the positions. The SIR of a hop is the
-    /// smaller of forward SIR and backward SIR / `reverse`.
+    /// Returns the best SIR of the worst hop, and the relays' positions, by grid search and refinement.
+    ///
+    /// The SIR of a hop is the smaller of forward SIR and backward SIR / `reverse`.
     pub(crate) fn best(&self) -> (f64, Vec<f64>) {
         let grid = self.grid();
         let start = self.best_on(&vec![grid; self.relays()]);

@@ -7,7 +7,7 @@ use uav_relay_oracle::random::count;
 use super::judge::Chain;
 use super::scenes::{ENDS, LOS, NLOS, adversarial, in_noise, log_uniform, mission, narrow, usual};
 
-/// Returns the two-way SIR of the worst hop on the relays' agreed positions, and these positions.
+/// Returns the worst hop's two-way SIR at the relays' agreed positions, and these positions.
 ///
 /// The SIR is 0 without an agreement. The two-way SIR of a hop is the smaller of its forward SIR and its backward SIR
 /// divided by the chain's `reverse`.
@@ -22,10 +22,10 @@ pub(crate) fn reached(chain: &Chain) -> (f64, Vec<f64>) {
 
 type Draw<R> = fn(&mut R, [f64; 2], f64) -> Chain;
 
-/// Checks in random scenes that the relays' agreed positions are as good as the best of a grid search.
+/// Checks in random scenes that the agreed positions are as good as the best ones of a grid search.
 ///
-/// The SIR of a scene is that of its worst hop, in the worse direction. At least 99.5 % of the scenes must be within 1e-4 of the best SIR
-/// of the grid search, and all within 1 %.
+/// The SIR of a scene is that of its worst hop, in the worse direction. At least 99.5 % of the scenes must be within
+/// 1e-4 of the best SIR of the grid search, and all within 1 %.
 fn as_good_as_the_judge(seed: u64, scenes: usize, noisy: bool, draw: Draw<ChaCha8Rng>) {
     let mut rng = generator(seed);
     for ends in ENDS {
@@ -87,10 +87,10 @@ fn the_best_places_near_an_interferer_in_noise_are_found() {
     as_good_as_the_judge(3305, 60, true, adversarial);
 }
 
-/// Checks that relays stay at Tx if an interferer lies between them and a weak Rx.
+/// Checks that relays stay at Tx if an interferer lies between Tx and a weak Rx.
 ///
-/// The SIR of the chain is that of its worst hop in the worse direction. A chain with its last relay above Rx, beyond
-/// the interferer, has less than 0.3 of the SIR of a chain with all relays at Tx.
+/// The SIR of a chain is that of its worst hop in the worse direction. A chain whose last relay is above Rx, beyond the
+/// interferer, has less than 0.3 of the SIR of a chain with all relays at Tx.
 #[test]
 fn relays_stay_at_tx_where_an_interferer_is_between_them_and_a_weak_rx() {
     let chain = Chain {

@@ -53,8 +53,9 @@ fn with_separation(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     chain
 }
 
-/// Numbers of scenes: all, and those with an SIR within 1e-4 or 5 % of that of the reference search. `worst` is the smallest ratio of an
-/// SIR to that of the reference search.
+/// Numbers of all scenes, and of those within 1e-4 (`tight`) or 5 % (`near`) of the reference SIR.
+///
+/// `worst` is the smallest ratio of an SIR to the reference SIR, which a search finds.
 #[derive(Debug, Default)]
 struct Tally {
     all: usize,
@@ -105,10 +106,10 @@ impl Tally {
     }
 }
 
-/// Checks Algorithm 1 against an independent search (the judge) in random scenes. Each scene is solved for both directions and for one
-/// direction. `change` modifies each scene; `what` names the change in the output.
+/// Checks Algorithm 1 against an independent search (the judge) in random scenes.
 ///
-/// For both directions all SIRs must be within 1e-4 of the judge's SIR if `is_exact`; otherwise at least 80 % of them within 5 %.
+/// `change` modifies a scene, and `what` names the change. Each scene is solved for both directions and for one. If
+/// `is_exact`, all SIRs for both directions must be within 1e-4 of the judge's; otherwise 80 % of them within 5 %.
 fn best_places(seed: u64, what: &str, is_exact: bool, change: fn(&mut ChaCha8Rng, Chain) -> Chain) {
     let mut rng = generator(seed);
     let draws: [(&str, Draw); 2] = [("usual", usual), ("near an interferer", adversarial)];
@@ -156,10 +157,10 @@ fn best_places_of_own_relays_with_a_separation_that_binds() {
     });
 }
 
-/// Checks that the SIR is within 1e-4 of the optimum if relay 8 stays short of relay 7's farthest x.
+/// Checks that the SIR is within 1e-4 of the optimum if relay 8 stays nearer to Tx than relay 7 could.
 ///
-/// Relays 7 and 8 differ by 65 m in altitude, so that both must be far from the interferer. A search that allows a sender with a larger x
-/// than its receiver finds a wrong x for relay 8.
+/// Relays 7 and 8 differ by 65 m in altitude, so that both must be far from the interferer. A search that allows a
+/// sender with a larger x than its receiver finds a wrong x for relay 8.
 #[test]
 fn a_relay_that_stays_short_of_the_previous_ones_reach() {
     let chain = Chain {
@@ -203,8 +204,8 @@ fn a_relay_that_stays_short_of_the_previous_ones_reach() {
 
 /// Checks that the SIR is within 1e-4 of the optimum if only the fourth relay leaves Tx.
 ///
-/// The interferer is between the third and the fourth relay. The fourth relay has its largest x if the third is at x = 0. Then the first
-/// two have to be at x = 0, too.
+/// The interferer is between the third and the fourth relay. The fourth relay can go farthest if the third relay is at
+/// x = 0, which forces the first two relays to x = 0, too.
 #[test]
 fn three_relays_next_to_tx_before_an_interferer() {
     let chain = Chain {

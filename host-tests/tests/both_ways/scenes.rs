@@ -148,7 +148,9 @@ pub(crate) fn in_field(rng: &mut impl Rng, ends: [f64; 2], reverse: f64, kind: u
     chain
 }
 
-/// Adds receiver noise to a scene: 1e-3 to 1e2 of the interference at a random position on the line.
+/// Adds receiver noise to a scene: 1e-3 to 1e2 times the interference power at a random position.
+///
+/// The position is on the line from Tx to Rx.
 pub(crate) fn in_noise(rng: &mut impl Rng, chain: Chain) -> Chain {
     let place = rng.random_range(0.0..=chain.distance_m);
     let [power_w, x, y] = chain.interferer;

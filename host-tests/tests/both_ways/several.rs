@@ -12,7 +12,9 @@ use super::judge::Chain;
 use super::scenes::{ENDS, log_uniform, narrow};
 use super::shares::Shares;
 
-/// Random scene with several interferers: the scenario, the chain for the judge, the number of relays.
+/// Draws a random scene with several interferers.
+///
+/// Returns the scenario, the same chain for the reference search (the judge), and the number of relays.
 fn draw(rng: &mut impl Rng, round: usize) -> (Scenario, Chain, u16) {
     let ends = ENDS[round % 3];
     let sources: Vec<[f64; 3]> = (0..rng.random_range(2..=4))
@@ -63,9 +65,10 @@ fn draw(rng: &mut impl Rng, round: usize) -> (Scenario, Chain, u16) {
     (scenario, chain, relays)
 }
 
-/// Checks two-way chains whose positions are computed for one interferer that stands for several.
+/// Checks two-way chains whose relays are placed for one interferer that stands for several.
 ///
-/// With positions chosen for both directions, the median SIR must be higher than with positions chosen for one direction.
+/// With positions chosen for both directions, the median SIR must be higher than with positions chosen for one
+/// direction.
 #[test]
 fn places_for_both_directions_beat_one_way_ones_against_several() {
     let mut rng = generator(3325);
@@ -93,8 +96,8 @@ fn places_for_both_directions_beat_one_way_ones_against_several() {
 
 /// Checks that the planner's positions for both directions are as good as the judge's.
 ///
-/// The judge, an independent search, knows all interferers. The planner's SIRs are within 1e-4 of the judge's. They are within 1 % in
-/// scenes where the planner keeps the positions for the hypothetical interferer.
+/// The judge, an independent search, knows all interferers. SIRs must be within 1e-4 of the judge's. Where the planner
+/// keeps the positions for the hypothetical interferer (one that stands for all), 1 % suffices.
 #[test]
 fn the_planner_places_relays_for_the_sum_of_several() {
     let mut rng = generator(3326);

@@ -20,9 +20,10 @@ use super::space_judge::{Place, Space};
 /// Lowest and highest altitude of the relays in all scenes, m.
 const BAND_M: [f64; 2] = [20.0, 300.0];
 
-/// Draws the random scene `number`, and returns it after the name of its kind. Kinds differ in three ways: with or
-/// without lateral offsets; with r, the required ratio of backward to forward SIR, 1 or random; with or without
-/// noise. The interferer is near the line Tx-Rx if `wild`.
+/// Draws the random scene `number`. Returns the name of the scene's kind, and the scene.
+///
+/// Kinds differ in lateral offsets (with or without), in r, the required ratio of backward to forward SIR (1 or
+/// random), and in noise (with or without). If `wild`, the interferer is near the line Tx-Rx.
 fn scene(rng: &mut ChaCha8Rng, number: usize, wild: bool) -> (String, Space) {
     let is_free = number / 3 % 2 == 1;
     let is_drawn = number / 6 % 2 == 1;
@@ -90,7 +91,9 @@ fn wide(places: &[Placement]) -> Vec<Place> {
     places.iter().map(wide).collect()
 }
 
-/// Returns the relays' positions by the joint method, after a check of their limits and separation.
+/// Returns the relays' positions by the joint method, and checks their limits and separation.
+///
+/// The joint method optimises x, lateral offset and altitude of all relays together.
 fn joint(mission: &Mission) -> Vec<Placement> {
     let seat = Seat::common(mission);
     let places = solved(mission, |_| seat).unwrap();
@@ -108,8 +111,9 @@ fn joint(mission: &Mission) -> Vec<Placement> {
     places
 }
 
-/// Prints the worst value, first percentile and median of `shares`, by kind of scene and for all. A share is the
-/// method's SIR divided by that of the reference search.
+/// Prints worst value, first percentile and median of `shares`, for each kind of scene and for all.
+///
+/// A share is the joint method's SIR divided by that of the reference search.
 fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     let all: Vec<f64> = shares.values().flatten().copied().collect();
     shares.insert("all".to_owned(), all);
@@ -126,8 +130,9 @@ fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     }
 }
 
-/// Returns the ratios of the joint method's SIR to that of a reference search, in ascending order. There is one ratio for each random
-/// scene. The interferer is near the line Tx-Rx if `wild`.
+/// Returns the ratios of the joint method's SIR to that of a reference search, in ascending order.
+///
+/// There is one ratio for each random scene. The interferer is near the line Tx-Rx if `wild` is true.
 fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut seeds = generator(seed);
@@ -169,9 +174,10 @@ fn the_joint_method_is_near_the_best_places_next_to_an_interferer() {
     near_the_best_places(3311, 12, true);
 }
 
-/// Checks that the joint method finds the better of two local optima. In one optimum relay 1 is above the interferer, in the other beyond
-/// it. The expected SIRs come from an independent search. For the better optimum the method needs a start with relay 1 above the
-/// interferer; without this start its SIR is up to 10 % lower.
+/// Checks that the joint method finds the better of two optima, with relay 1 above the interferer.
+///
+/// Relay 1 is beyond the interferer in the other optimum, whose SIR is up to 10 % lower. The method needs a start near
+/// the better one. The expected SIRs come from an independent search.
 #[test]
 fn the_joint_method_finds_the_chain_above_the_interferer() {
     type Scene = (u16, f64, f64, f64, [f64; 3], f64);

@@ -24,12 +24,14 @@ pub(crate) struct Space {
     pub(crate) band_m: [f64; 2],
 }
 
-/// Numbers of grid points along x, y and h in the first search. The first row is for relays that may leave the line
-/// sideways, the second one for relays above it.
+/// Numbers of grid points along x, y and h with which the search begins.
+///
+/// The first row is for relays that may have lateral offsets, the second row for relays without.
 const GRID: [[usize; 3]; 2] = [[36, 9, 5], [64, 1, 10]];
 
-/// Numbers of grid points along x, y and h in a refinement. The first row is for relays that may leave the line
-/// sideways, the second one for relays above it.
+/// Numbers of grid points along x, y and h with which the search refines a position.
+///
+/// The first row is for relays that may have lateral offsets, the second row for relays without.
 const WINDOW: [[usize; 3]; 2] = [[5, 5, 5], [7, 1, 7]];
 
 impl Space {
@@ -146,9 +148,10 @@ impl Space {
         points
     }
 
-    /// Improves the positions `start` by searches in a window around each. Returns the worst hop's two-way SIR (smaller of forward SIR and
-    /// backward SIR / r), and the positions. The first windows extend `width` metres to each side. When windows give no improvement,
-    /// smaller windows follow.
+    /// Improves the positions `start` by searches in a window around each position.
+    ///
+    /// Returns the worst hop's two-way SIR (smaller of forward SIR and backward SIR / r), and the positions. Windows
+    /// first extend `width` metres to each side; when they give no improvement, smaller windows follow.
     pub(crate) fn refined(
         &self,
         start: &[Place],

@@ -50,8 +50,9 @@ fn place_of(chain: &Chain, places: &[Place], node: usize) -> Place {
     }
 }
 
-/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`. It counts the worse direction of
-/// each hop.
+/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`.
+///
+/// The two-way SIR of a hop is the smaller of its forward SIR and its backward SIR divided by the chain's `reverse`.
 fn value(chain: &Chain, places: &[Place]) -> f64 {
     let hops = (1..=places.len() + 1).map(|node| {
         let [from, to] = [node - 1, node].map(|node| place_of(chain, places, node));
@@ -60,7 +61,7 @@ fn value(chain: &Chain, places: &[Place]) -> f64 {
     hops.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the best position of relay `node` between its neighbours, and the SIR of its worse hop.
+/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops.
 ///
 /// The position is found by a grid search with altitudes within `altitudes_m`.
 fn turn(chain: &Chain, places: &[Place], node: usize, altitudes_m: [f64; 2]) -> (Place, f64) {
@@ -137,8 +138,9 @@ fn draw(rng: &mut ChaCha8Rng, round: usize) -> Chain {
     }
 }
 
-/// Checks that one relay's search in Algorithm 2 is as good as a dense grid search. The relays are at random
-/// positions; both searches have the same range of x and altitude.
+/// Checks that one relay's search in Algorithm 2 is as good as a dense grid search.
+///
+/// The relays are at random positions. Both searches have the same ranges of x and altitude.
 #[test]
 fn a_turn_is_as_good_as_a_dense_grid() {
     let mut rng = generator(3313);
@@ -220,7 +222,9 @@ fn a_turn_is_as_good_as_a_dense_grid() {
     assert!(silent.percentile(0.5) > 0.9999 && noisy.percentile(0.5) > 0.9999);
 }
 
-/// Checks that Algorithm 2 in simulated chains gains as much SIR as a grid search in the same rounds. Both start from the same positions.
+/// Checks that Algorithm 2 in simulated chains gains as much SIR as a grid search of the same rounds.
+///
+/// Both searches start from the same positions.
 #[test]
 fn flown_turns_gain_what_turns_by_a_dense_grid_gain() {
     let mut rng = generator(3314);

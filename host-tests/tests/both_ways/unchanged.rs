@@ -18,11 +18,12 @@ const SWEEP: u8 = 0;
 const VERDICT: u8 = 1;
 const ASIDE: u8 = 5;
 
-/// Number of random scenarios whose results enter the recorded hash.
+/// Number of random scenarios whose results are hashed.
 const SCENARIOS: u32 = 1_000;
 
-/// FNV-1a hash of the results of all scenarios with one direction. The results are the target SIRs, the numbers of sweeps and the
-/// positions.
+/// FNV-1a hash of the results of all scenarios with traffic in one direction.
+///
+/// The results are the target SIRs, the numbers of sweeps (messages along the chain) and the positions.
 const RECORDED: u64 = 0x12dc_53fc_8c0c_d073;
 
 fn add(hash: &mut u64, bits: u32) {
@@ -77,7 +78,7 @@ fn add_flown(hash: &mut u64, setup: Setup) {
     add(hash, outcome.messages as u32);
 }
 
-/// Returns a random scene of `relays` relays with a band of altitudes; every third one has noise.
+/// Returns a random mission of `relays` relays with an altitude range; every third mission has noise.
 fn scene(rng: &mut impl Rng, round: usize, relays: usize) -> MissionConfig {
     let link = Link {
         x_i: rng.random_range(-200.0..1200.0),
@@ -121,8 +122,9 @@ fn turns_of_one_direction_are_equal_to_the_bit() {
     assert_eq!(hash, RECORDED, "{hash:#018x}");
 }
 
-/// Checks that the joint method still gives the recorded positions for missions of one direction. In every second scene the relays may also
-/// have lateral offsets.
+/// Checks that the joint method still gives the recorded positions for traffic in one direction.
+///
+/// In every second scene the relays may also have lateral offsets.
 #[test]
 fn joint_places_of_one_direction_are_equal_to_the_bit() {
     const RECORDED: u64 = 0xf047_a192_5366_f9f4;
@@ -180,10 +182,10 @@ fn places_in_a_field_of_one_direction_are_equal_to_the_bit() {
     assert_eq!(hash, RECORDED, "{hash:#018x}");
 }
 
-/// Adds the bodies of the Sweeps, Verdicts and Asides that the relays of a run send to the hash `hash`.
+/// Adds the bodies of the Sweep, Verdict and Aside messages that the relays of a run send to `hash`.
 ///
-/// The digest in bytes 3 and 4 of each body is left out, because older versions of the crate computed it without `reverse`. The hash
-/// depends on the sequence on each link, but not on times, because other messages had other lengths in older versions.
+/// The digest in bytes 3 and 4 of each body is left out: older versions of the crate computed it without `reverse`. The
+/// hash depends on the order on each link, but not on times, because some messages have changed their length.
 fn add_passes(hash: &mut u64, mut setup: Setup) -> usize {
     setup.record = true;
     let mut chain = SimulatedChain::new(setup).unwrap();
@@ -212,8 +214,9 @@ fn add_passes(hash: &mut u64, mut setup: Setup) -> usize {
     count
 }
 
-/// Checks that relays with a mission of one direction send the recorded Sweeps, Verdicts and Asides. They were recorded before missions of
-/// two directions existed.
+/// Checks that relays send the recorded Sweep, Verdict and Aside messages for traffic in one direction.
+///
+/// The messages were recorded before missions could have traffic in both directions.
 #[test]
 fn passes_of_one_direction_are_equal_byte_for_byte() {
     const RECORDED: u64 = 0xdeb4_11e3_1ec0_46b1;

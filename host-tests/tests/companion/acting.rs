@@ -33,8 +33,9 @@ impl Page {
         snapshots(&self.address).next().unwrap()
     }
 
-    /// Sends the page's request for a task, in which the text `change[0]` is replaced by `change[1]`. Returns status
-    /// and answer.
+    /// Sends the page's request for a task, with the text `change[0]` replaced by `change[1]`.
+    ///
+    /// Returns the status and the body of the answer.
     fn sends(&self, path: &str, body: &Value, change: [&str; 2]) -> (u16, String) {
         let (own, body, token) = (&self.address, body.to_string(), &self.token);
         let length = body.len();
@@ -57,7 +58,7 @@ impl Page {
         self.sends(path, &body, ["", ""])
     }
 
-    /// Checks that the station refuses an upload request that is more than 5 s old or states no time.
+    /// Checks that the station refuses an upload request that is more than 5 s old or has no time.
     fn refuses_old_times(&self, request: &Value) {
         let refused = self.sends("/upload", request, ["", ""]);
         assert!(refused.1.contains("missing field `time_s`"), "{refused:?}");
@@ -214,7 +215,7 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     }
 }
 
-/// Checks that random previews equal, to the bit, the setpoints that the relays then have.
+/// Checks that random previews equal, to the bit, the setpoints that the relays have after the upload.
 ///
 /// `COUNT=200 cargo test --test companion acting::random_previews -- --nocapture` uploads 200 missions.
 #[test]
@@ -293,7 +294,9 @@ fn random_previews_are_flown_as_they_were_shown() {
     station.stopped();
 }
 
-/// Checks that a lost relay is cleared at the station only, and is back at its next report. The capture has the act.
+/// Checks that a lost relay is cleared only at the station, and is shown again at its next report.
+///
+/// The capture records that the relay was cleared.
 #[test]
 fn a_lost_relay_is_cleared_from_the_page_until_it_reports_again() {
     let (mut chain, station, page) = chain_with_page();

@@ -7,7 +7,7 @@ use crate::flying::Flight;
 use crate::peer::{Peer, RX, ReceivedMessage, Site, TX, apart_m, between_m, on_earth, text};
 use crate::process::Relay;
 
-/// Part of the companion's log line about a drone far from its line: the suggested cause.
+/// Cause that the companion suggests in its log line about a drone far from the line Tx-Rx.
 const SWAPPED: &str = "are latitude and longitude swapped?";
 
 /// Test scene: a drone, and its relay. The positions of Tx and Rx in the relay's settings are far from the drone.
@@ -114,7 +114,7 @@ fn an_arducopter_far_from_a_swapped_line_is_reported() {
     is_off_a_swapped_line("arducopter");
 }
 
-/// Checks that the report of a drone far from its line does not always suggest swapped coordinates.
+/// Checks that a report of a drone far from the line Tx-Rx need not suggest swapped coordinates.
 ///
 /// Here Tx and Rx are configured 0.1 degrees too far south, so the report must not suggest a swap.
 #[test]

@@ -24,7 +24,9 @@ struct Pair {
     index: usize,
     own: String,
     _others: Vec<Relay>,
-    /// Thread that reports the positions of the other drones until the flag is true. The motion guards of these drones need the positions.
+    /// Thread that reports the positions of the other drones until the flag is true.
+    ///
+    /// The motion guards of these drones need the positions.
     hover: (Arc<AtomicBool>, Option<JoinHandle<()>>),
 }
 
@@ -36,7 +38,9 @@ impl Drop for Pair {
 }
 
 impl Pair {
-    /// Starts all relays of a chain of `of`. The drone of relay `index` is on the ground; `battery` is the command that sets its battery.
+    /// Starts all relays of a chain of `of` relays.
+    ///
+    /// The drone of relay `index` is on the ground; `battery` is the command that sets this drone's battery.
     fn grounded([index, of]: [usize; 2], kind: &str, more: &str, battery: &str) -> Self {
         let chain = Chain::on_channel(of, Medium::new(of, QUIET));
         let link = chain.files.text("autopilot");
@@ -199,7 +203,8 @@ fn a_low_battery_leads_an_arducopter_out_of_the_chain() {
 
 /// Checks that relay 1, the initial leader, stays outside if it restarts with a low battery.
 ///
-/// The autopilot is slow: its first message with the landed state comes after 3 s, and its next battery message is lost.
+/// The autopilot is slow: its first message with the landed state comes after 3 s, and the next battery message is
+/// lost.
 #[test]
 fn a_leader_with_a_slow_autopilot_restarts_outside_of_the_chain() {
     let mut pair = Pair::grounded([1, 3], "px4", "", "battery 80 1200");
@@ -220,8 +225,9 @@ fn a_leader_with_a_slow_autopilot_restarts_outside_of_the_chain() {
     pair.stays_outside();
 }
 
-/// Checks that a relay reads its endurance from lines of `--positions`. An invalid line makes it unknown. Then the relay must obey the
-/// operator's commands `stay` and `leave`.
+/// Checks that a relay reads its endurance from lines of `--positions`.
+///
+/// An invalid line makes the endurance unknown. Then the relay must obey the operator's commands `stay` and `leave`.
 #[test]
 fn endurance_is_read_from_the_positions() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));
@@ -300,7 +306,7 @@ fn without_a_reserve_no_endurance_counts() {
     assert!(!relay.has_printed("\"event\":\"endurance unknown\""));
 }
 
-/// Checks that a relay with `--reserve` logs an unknown endurance if it receives only positions.
+/// Checks that a relay with `--reserve` logs an unknown endurance if its FIFO has only positions.
 #[test]
 fn an_endurance_that_never_comes_is_told() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));

@@ -46,8 +46,8 @@ fn block(heading: &str, language: &str) -> String {
 
 /// Checks that the two relays of the first example in `examples/LINUX.md` agree.
 ///
-/// The script of the example runs until both have logged their agreement, and is then terminated. A user would end it
-/// by Ctrl-C.
+/// The test terminates the script of the example after both relays have logged their agreement. A user would end the
+/// script by Ctrl-C.
 #[test]
 fn two_relays_on_one_computer_agree() {
     let script = block("## The companion of a drone", "sh");

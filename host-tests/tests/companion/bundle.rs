@@ -39,7 +39,9 @@ fn bundle(files: &Files, text: &str, more: &str) -> Output {
     command.args(more.split_whitespace()).output().unwrap()
 }
 
-/// Test setup: three relays and a ground station on one channel, each with its folder of a bundle.
+/// Test setup: three relays and a ground station on one channel.
+///
+/// Each of them has its own folder of the bundle.
 struct Bench {
     files: Files,
     channel: Medium,
@@ -84,7 +86,7 @@ impl Bench {
         self.files.path("out").join(name)
     }
 
-    /// Changes the paths in the file `config` to those of this test. Fills in the radio's serial number.
+    /// Replaces the paths in the file `config` by those of this test. Fills in the radio's serial number.
     fn installs(&self, config: &str, port: &str) {
         let (path, folder) = (self.path(config), self.path(config));
         let folder = folder.parent().unwrap();
@@ -127,8 +129,9 @@ impl Bench {
         relays
     }
 
-    /// Runs `--check` for relay 2 and returns the lines of failed checks, which begin with `red`. Panics if the exit status contradicts
-    /// these lines.
+    /// Runs `--check` for relay 2 and returns the lines of failed checks, which begin with `red`.
+    ///
+    /// Panics if the exit status contradicts these lines.
     fn reds(&self, more: &str, seconds: u64) -> Vec<String> {
         let ended = self
             .companion(2, &format!("--check={seconds} {more}"))
@@ -252,7 +255,7 @@ fn a_bundle_is_green_and_its_relays_agree() {
     }
 }
 
-/// Checks that each drone flies to the position that the page of its folder states.
+/// Checks that each drone flies to the position that is stated on the page in its folder of the bundle.
 #[test]
 fn every_folder_of_a_bundle_flies() {
     let mut bench = Bench::new();
@@ -605,7 +608,9 @@ fn a_check_names_planted_faults_of_the_radio() {
     bench.finds(&port(2), &[damaged; 2]);
 }
 
-/// Checks that `--check` of a relay on two wires succeeds. Its running neighbours must form no view with it.
+/// Checks that `--check` of a relay on two wires succeeds.
+///
+/// The relay's running neighbours must not form a membership view with it.
 #[test]
 fn a_relay_on_wires_is_checked() {
     let chain = Chain::on_wires(3, QUIET).with(QUICK);
@@ -631,8 +636,9 @@ fn a_relay_on_wires_is_checked() {
     }
 }
 
-/// Checks that `cargo provision --bundle` refuses any tolerance but that of the companions. With another tolerance the positions in the
-/// bundle would differ from those to which the companions fly.
+/// Checks that `cargo provision --bundle` refuses any other tolerance than that of the companions.
+///
+/// With another tolerance the positions in the bundle would differ from those to which the companions fly.
 #[test]
 fn a_bundle_has_the_tolerance_of_the_companions() {
     let files = Files::new();

@@ -81,8 +81,9 @@ fn a_capture_that_cannot_begin_is_refused() {
     assert!(line.contains("--capture /dev/full: "), "{line}");
 }
 
-/// Checks that a full disk ends a relay's capture but not its flight. The relay has two ports, and reports the
-/// failure once for both.
+/// Checks that a full disk ends a relay's capture but not its flight.
+///
+/// The relay has two ports, and reports the failure only once for both ports.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     let mut chain = Chain::on_wires(3, QUIET).with("--probe-after-ms 300 --dead-after-ms 900");

@@ -16,7 +16,7 @@ pub(crate) const QUICK: &str = "--probe-after-ms 500 --dead-after-ms 1500";
 /// Agreed position and target SIR of a relay: x, y, altitude and target as f32 bits.
 pub(crate) type Place = [u32; 4];
 
-/// Returns the agreed positions of all relays of a simulated chain, to compare the processes with.
+/// Returns all agreed positions of a simulated chain, for a comparison with those of relay processes.
 pub(crate) fn simulated(scenario: &Scenario, relays: u16) -> Vec<Place> {
     simulated_by(Method::Align, scenario, relays)
 }
@@ -72,8 +72,9 @@ impl Chain {
         }
     }
 
-    /// Creates a chain on the shared channel `channel`. Its first `of` ttys are for the relays. No relay is started
-    /// yet.
+    /// Creates a chain on the shared channel `channel`. No relay is started yet.
+    ///
+    /// The first `of` ttys of the channel are for the relays.
     pub(crate) fn on_channel(of: usize, channel: Medium) -> Self {
         Self {
             is_shared: true,
@@ -111,7 +112,7 @@ impl Chain {
         chain
     }
 
-    /// Starts relay `index` with the options of all relays and its own.
+    /// Starts relay `index` with the common options of all relays and the additional options `own`.
     pub(crate) fn relay(&self, index: usize, own: &str) -> Relay {
         Relay::start(&self.arguments(index, own))
     }

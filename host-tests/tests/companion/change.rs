@@ -13,8 +13,9 @@ use crate::pty::Pty;
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Chain of two relay processes without drones, for mission changes. The mission is as long as the distance of Tx and
-/// Rx in [`SITED`].
+/// Chain of two relay processes without drones, for mission changes.
+///
+/// The distance from Tx to Rx in the mission is that of the positions in [`SITED`].
 struct Bench(Chain);
 
 impl Bench {
@@ -148,7 +149,9 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     assert!(!bench.0.relays[0].has_printed("uploaded: "));
 }
 
-/// Checks that a dry run fails with status 1 if the upload would leave the geofence, else succeeds.
+/// Checks that a dry run fails with status 1 if the upload would leave the geofence.
+///
+/// Otherwise the dry run succeeds.
 #[test]
 fn a_dry_run_that_leaves_the_geofence_fails() {
     let mut bench = Bench::new();
@@ -176,7 +179,7 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
     assert!(!bench.0.relays[0].has_printed("uploaded: "));
 }
 
-/// Checks that an upload with `--from-loaded` shows every earlier change that it reverts.
+/// Checks that an upload with `--from-loaded` shows every earlier change that the upload reverts.
 ///
 /// Such an upload changes the mission that the relays had before flight, and not the mission that they fly.
 #[test]

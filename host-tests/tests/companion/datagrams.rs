@@ -15,7 +15,9 @@ pub(crate) struct Ports {
 }
 
 impl Ports {
-    /// Returns a free pair of UDP ports of PX4's simulation: 14580 + i and 14540 + i for simulated drone i.
+    /// Returns a free pair of UDP ports of PX4's simulation.
+    ///
+    /// Simulated drone i has the ports 14580 + i (autopilot) and 14540 + i (companion).
     fn of_px4() -> Self {
         let first = std::process::id() as u16;
         let pairs = (0..10).map(|i| (first.wrapping_add(i)) % 10);
@@ -28,7 +30,7 @@ impl Ports {
             .expect("one of ten pairs is free")
     }
 
-    /// Returns a pair of free ports. The companion's port is `apart` above the autopilot's.
+    /// Returns a pair of free ports. The companion's port number is `apart` above the autopilot's port number.
     pub(crate) fn apart(apart: u16) -> Self {
         let mut pairs = (0..100).filter_map(|_| {
             let port = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -48,8 +50,9 @@ impl Ports {
         bound.iter().all(Result::is_ok)
     }
 
-    /// Starts a drone on the ground at the autopilot's port. The drone sends to the UDP port `partner` until it
-    /// receives a datagram.
+    /// Starts a drone on the ground whose autopilot uses the autopilot's port of this pair.
+    ///
+    /// The drone sends to the UDP port `partner` until it receives a datagram.
     pub(crate) fn drone(self, partner: u16) -> Peer {
         Peer::autopilot("px4", &format!("udp:{}@{partner}", self.port), 380.0, None)
     }
@@ -114,7 +117,7 @@ fn a_companion_restarted_in_the_air_is_received() {
     second.line("autopilot: in the air");
 }
 
-/// Checks that refused datagrams, while the autopilot's port is closed, do not end the companion.
+/// Checks that the companion survives a closed autopilot port, at which its datagrams are refused.
 #[test]
 fn an_autopilot_that_restarts_is_found_again() {
     let ports = Ports::apart(1_000);

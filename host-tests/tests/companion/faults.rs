@@ -19,36 +19,39 @@ use crate::reported::{Flown, Page, alarms, relays, restart};
 /// Number of faults that the test in `cargo ci` injects; the variable COUNT replaces it.
 const FEW: usize = 7;
 
-/// Longest permitted time from the chain's own detection of a fault to the alarm, s.
+/// Longest permitted time from the detection of a fault by the relays to the alarm on the page, s.
 const SOON_S: f64 = 2.0;
 
 /// Shortest silence of a relay after which the station misses its reports, s.
 const SILENT_S: f64 = 5.0;
 
-/// Time after which the station notices that a relay's reports are missing, s. The reports may have gone through another lost relay.
+/// Time after which the station notices that a relay's reports are missing, s.
+///
+/// The reports may have gone through another relay that is lost, too.
 const LOST_S: f64 = 10.0;
 
-/// Time after which a fault that neither a companion nor the page has noticed is a failure.
+/// Time in which a companion or the page must notice a fault.
 const MOST: Duration = Duration::from_secs(90);
 
 /// Time without a lease after which the page shows an alarm, s.
 const EXPIRED_S: f64 = 5.0;
 
-/// Longest time between a relay's state and its report, and between two queries of that state, s.
+/// Longest time between a relay's state and the relay's report of it, s.
+///
+/// It is also the longest time between two queries of that state.
 const NEAR_S: f64 = 2.0;
 
-/// Longest wait for a snapshot of the page between two queries of relays' states.
+/// Longest wait for a snapshot of the page before the state of the next relay is queried.
 const STEP: Duration = Duration::from_millis(20);
 
 const LEASE: &str = ": last agreement on positions expired";
 
 const NO_QUORUM: &str = "no quorum: ";
 
-/// Fault: the command that causes it, the relay, the alarm, and a log line. Relay 0 stands for the whole chain. The log line is from a
-/// companion that has noticed the fault. `#` stands for the relay's number.
+/// Fault: the command that causes it, the relay, the alarm, and a log line of a noticing companion.
 ///
-/// A log line that begins with `relay` may come from any companion. Other lines come from the relay's own companion, or from any companion
-/// if the relay is 0.
+/// Relay 0 is the whole chain, and `#` stands for the relay's number. A log line that begins with `relay` may come from
+/// any companion, and so may a log line about relay 0; other lines come from the relay's own companion.
 type Fault = (&'static str, usize, &'static str, &'static str);
 
 const RELEASED: &str = "warning relay # released";
@@ -56,7 +59,9 @@ const BLIND: &str = "critical relay #: the autopilot reports no position";
 const UNLINKED: &str = "critical relay #: the link to the autopilot is lost";
 const LOST: &str = "critical relay #";
 
-/// Groups of faults that happen at the same time, with the log lines expected in the companions' logs.
+/// Groups of faults that happen at the same time.
+///
+/// Each fault states the alarm on the page and the log line that the test expects.
 const SCRIPT: [&[Fault]; 14] = [
     &[
         ("pilot", 3, RELEASED, "released: "),
@@ -127,7 +132,9 @@ const SCRIPT: [&[Fault]; 14] = [
     &[("no quorum", 0, "critical no quorum", "no quorum: ")],
 ];
 
-/// Prints the times from each fault until a companion notices it, and until its alarm, s. Returns a text for each late alarm.
+/// Prints the times, s, from each fault until a companion notices it and until its alarm.
+///
+/// Returns a text for each late alarm.
 fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
     let mut failures = Vec::new();
     for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(times) {
@@ -150,10 +157,10 @@ fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
     failures
 }
 
-/// State of a relay by its own status and log, since the begin of the present group of faults.
+/// State of a relay by its own status and log, since the present group of faults began.
 #[derive(Clone, Debug, Default)]
 struct Own {
-    /// Time of each query of its status, s, with true if the relay had a setpoint but no lease.
+    /// Queries of the relay's status: time, s, and true if the relay had a setpoint but no lease.
     leaseless: Vec<(f64, bool)>,
     /// True if the relay has logged that it has no quorum.
     lacks_quorum: bool,
@@ -186,9 +193,9 @@ pub(crate) struct Stage {
     page: Page,
     begun: Instant,
     own: Vec<Own>,
-    /// Number of queries of a relay's own state.
+    /// Number of queries of the relays' states so far.
     queries: usize,
-    /// Alarms about a relay's own state that its own state contradicts.
+    /// Alarms of the page about a relay's state that the relay's own status and log contradict.
     untrue: BTreeSet<String>,
     /// True if the page has had an alarm that a lease has expired.
     has_expired: bool,
@@ -234,8 +241,9 @@ impl Stage {
         lines
     }
 
-    /// Waits for the next snapshot of the page, at most for `limit`. Compares its alarms about the relays' own states with these
-    /// states. Returns false if none has arrived.
+    /// Waits for the next snapshot of the page, at most for `limit`. Returns false if none has arrived.
+    ///
+    /// Compares the snapshot's alarms about relays' states with the states that the relays themselves report.
     fn judge(&mut self, limit: Duration) -> bool {
         if !self.page.arrives(limit) {
             return false;
@@ -392,7 +400,10 @@ impl Stage {
         }
     }
 
-    /// Checks the alarms `new` of a group about relays without a fault: there are none, or they are true.
+    /// Checks the alarms `new` of the page: an alarm about a relay without a fault is a failure.
+    ///
+    /// Exceptions are true alarms about a lease or the quorum, if the group of faults takes several relays or the
+    /// quorum from the chain.
     fn check_others(&mut self, group: &[Fault], new: &[Value], failures: &mut Vec<String>) {
         let hurt: Vec<usize> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
         // With both ends or most relays lost, the rest of the chain has no lease for a while, and may have no quorum.
@@ -533,7 +544,7 @@ impl Stage {
     }
 }
 
-/// Returns the numbers of the relays that the fault `what` concerns.
+/// Returns the numbers of the relays that the fault `what` affects.
 fn hurt(what: &str, relay: usize) -> std::ops::RangeInclusive<usize> {
     match what {
         "no quorum" => 4..=8,
@@ -560,7 +571,9 @@ fn subjects(text: &str) -> impl Iterator<Item = usize> {
     numbers.into_iter()
 }
 
-/// Returns true if an alarm begins with `start`. If `start` ends with a relay's number, the alarm must be about the loss of this relay.
+/// Returns true if the text `alarm` begins with `start`.
+///
+/// If `start` ends with a relay's number, the alarm must be about the loss of this relay.
 fn is_of(alarm: &str, start: &str) -> bool {
     let is_lost = |rest: &str| rest.starts_with(" lost") || rest.starts_with(": no report");
     let rest = alarm.strip_prefix(start);

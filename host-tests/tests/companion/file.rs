@@ -73,8 +73,10 @@ fn three_relays_with_one_file_settle_like_the_simulation() {
     assert_ne!(settled[..], simulated(&Scenario::default(), 3));
 }
 
-/// Checks that relays use the fitted slots and the fixed altitudes that a scenario file demands. Fitted slots are time slots as long as
-/// each hop needs. The joint method has two names, `joint` and `altitude`; both are tested.
+/// Checks that relays use the fitted slots and the fixed altitudes that a scenario file demands.
+///
+/// Fitted slots are time slots as long as each hop needs. The joint method has the two names `joint` and `altitude`;
+/// the test uses both.
 #[test]
 fn fitted_slots_and_fixed_altitudes_of_a_file_are_flown() {
     let folder = Files::new();
@@ -126,7 +128,9 @@ fn fitted_slots_and_fixed_altitudes_of_a_file_are_flown() {
     }
 }
 
-/// Checks by the mission digest that all programs read the same mission from a scenario file.
+/// Checks that all programs read the same mission from a scenario file.
+///
+/// The digests of the missions are compared.
 #[test]
 fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
     let folder = Files::new();

@@ -70,7 +70,7 @@ pub(crate) fn write(path: impl AsRef<Path>, text: &str) {
 
 /// Sends `request` to a process's socket and returns the answer.
 ///
-/// With `is_whole` the client then closes its sending side, so that the process answers at once.
+/// If `is_whole` is true, the client then closes its sending side, and the process answers at once.
 pub(crate) fn answer(socket: impl AsRef<Path>, request: &str, is_whole: bool) -> String {
     let mut stream = None;
     wait_until(|| {

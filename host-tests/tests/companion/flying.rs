@@ -29,7 +29,9 @@ impl Flight {
         Self::found_by(kind, None, options)
     }
 
-    /// Starts a drone and a relay that sign with `key`, if any, and waits until both are in contact.
+    /// Starts a drone and a relay, and waits until they are in contact.
+    ///
+    /// If there is a `key`, the drone and the relay sign their frames with it.
     fn found_by(kind: &str, key: Option<&str>, options: &str) -> Self {
         let mut flight = Self::started(kind, [key; 2], options);
         if key.is_some() {
@@ -43,7 +45,7 @@ impl Flight {
         flight
     }
 
-    /// Starts a drone with the first key, and a relay with the second key and more `options`.
+    /// Starts a drone with the key `keys[0]`, and a relay with the key `keys[1]` and more `options`.
     pub(crate) fn started(kind: &str, keys: [Option<&str>; 2], options: &str) -> Self {
         let files = Files::new();
         let link = files.text("tty");
@@ -90,8 +92,7 @@ impl Flight {
         assert_eq!(there.mode(), "companion");
     }
 
-    /// Changes the flight mode, and waits until the relay has released the drone. The change is the pilot's or a
-    /// failsafe's.
+    /// Changes the flight mode, as a pilot or a failsafe does. Waits until the relay has released the drone.
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay

@@ -13,7 +13,7 @@ use crate::process::{Relay, bits};
 
 const LISTENING: &str = "--listen --interferer unknown --listen-every 0.5";
 
-/// Checks that a relay finds the interferer from positions and powers that its FIFO delivers.
+/// Checks that a relay finds the interferer from positions and powers that it reads from a FIFO.
 #[test]
 fn a_relay_locates_the_interferer_by_samples_from_a_fifo() {
     let scene = Scene::new(&Scenario::default(), 1).unwrap();
@@ -54,7 +54,7 @@ fn a_relay_locates_the_interferer_by_samples_from_a_fifo() {
 
 /// Checks that a relay in the air uses the noise measurements of its radio.
 ///
-/// The test recognises this by the relay's log line that the relays will spread to measure at other positions.
+/// The evidence is the relay's log line that the relays will spread to measure at other positions.
 #[test]
 fn noise_of_a_radio_on_the_autopilots_link_is_used() {
     let mut flight = Flight::found("arducopter", LISTENING);

@@ -101,8 +101,9 @@ fn every_option_of_the_mission_reaches_the_relays() {
     assert_ne!(expected, simulated(&Scenario::default(), 4));
 }
 
-/// Checks that relay processes choose the altitudes of the simulated chain. The relays start above their best
-/// altitudes.
+/// Checks that relay processes choose the same altitudes as the relays of the simulated chain.
+///
+/// The relays start above their best altitudes.
 #[test]
 fn three_processes_choose_the_altitudes_of_the_simulated_chain() {
     let scenario = Scenario {

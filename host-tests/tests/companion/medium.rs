@@ -24,7 +24,7 @@ pub(crate) struct Noise {
     pub(crate) seed: u64,
 }
 
-/// Maximum delay of the channel's thread that the channel makes up for by sending faster.
+/// Maximum delay of the channel's thread for which the channel compensates by sending faster.
 const LATEST: Duration = Duration::from_millis(20);
 
 pub(crate) const QUIET: Noise = Noise {
@@ -57,13 +57,15 @@ type Gate = Box<dyn FnMut(usize, &[u8]) -> bool + Send>;
 /// Ttys of a medium; `None` for an unplugged tty.
 type Ttys = Mutex<Vec<Option<Arc<Pty>>>>;
 
-/// Running radio channel or wire: copies the bytes of each tty to all other ttys. The ttys vanish when it is dropped.
+/// Running radio channel or wire: copies the bytes of each tty to all other ttys.
+///
+/// The ttys vanish when the `Medium` is dropped.
 #[derive(Debug)]
 pub(crate) struct Medium {
     paths: Vec<PathBuf>,
     ptys: Arc<Ttys>,
     counts: Arc<Counts>,
-    /// Bit mask of the ttys whose bytes are lost.
+    /// Bit mask of the ttys whose sent bytes are lost.
     cut: Arc<AtomicU16>,
     stop: Arc<AtomicBool>,
     pump: Option<JoinHandle<()>>,

@@ -7,9 +7,9 @@ const ONE: &str = "1111111122222222333333334444444455555555666666667777777788888
 /// MAVLink signing key of the other party, which differs in one digit and has white space around it.
 const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788888889\n";
 
-/// Checks that a relay reports that keys differ, ignores the drone's frames, and never logs a key.
+/// Checks that a relay reports differing MAVLink keys, ignores the drone's frames, and logs no key.
 ///
-/// In some cases only one of drone and relay has a key.
+/// In some cases only the drone or only the relay has a key.
 #[test]
 fn different_mavlink_keys_are_reported_and_frames_ignored() {
     let unsigned =

@@ -10,10 +10,12 @@ use crate::peer::{
 };
 use crate::process::Relay;
 
-/// New position of the receiver, about 200 m beyond the old one and to the right, on higher ground.
+/// New position of the receiver: 100 m farther along the old line, 250 m to its right, and higher.
 const MOVED: Site = [47.4095, 8.5535, 440.0];
 
-/// Time for which the drone stands still after the upload. The time is shorter than the wait of the motion guard.
+/// Time for which the drone stands still after the upload.
+///
+/// The motion guard makes the drone wait for a longer time.
 const STANDS: Duration = Duration::from_millis(2_500);
 
 #[test]

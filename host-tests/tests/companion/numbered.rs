@@ -6,9 +6,9 @@ use crate::chain::{Chain, QUICK};
 use crate::files::until;
 use crate::medium::{Medium, QUIET};
 
-/// Checks that relay 3 keeps its number in logs and status when it becomes the chain's second relay.
+/// Checks that relay 3 keeps its number in logs and status after relay 2 is lost.
 ///
-/// This happens when relay 2 is lost.
+/// Relay 3 is then the second relay of the chain.
 #[test]
 fn a_drone_keeps_its_number_when_its_place_changes() {
     let chain = Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK);

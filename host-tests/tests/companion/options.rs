@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use crate::process::Relay;
 
-/// Valid options of a relay, which the test puts before each entry of [`WRONG`]. An entry that is empty or begins
-/// with `--index` is tried without them.
+/// Valid options of a relay, which the test puts before each entry of [`WRONG`].
+///
+/// An entry that is empty or begins with `--index` is tried without these options.
 const GOOD: &str = "--index 2 --of 3 --upstream a --downstream b ";
 
 /// Options with the surveyed positions of transmitter and receiver, and their distance.

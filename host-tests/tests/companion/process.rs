@@ -75,7 +75,7 @@ impl Relay {
         }
     }
 
-    /// Waits for the next line that contains `part`.
+    /// Waits for the next output line that contains `part`, and returns the line.
     pub(crate) fn line(&mut self, part: &str) -> String {
         let end = Instant::now() + LIMIT;
         loop {
@@ -112,7 +112,7 @@ impl Relay {
         }
     }
 
-    /// Returns the new lines since the last call that contain `part`.
+    /// Returns those of the unread lines of the process that contain `part`.
     pub(crate) fn lines_with(&mut self, part: &str) -> Vec<String> {
         let lines: Vec<String> = self.lines.try_iter().collect();
         self.seen.extend(lines.iter().cloned());

@@ -78,7 +78,7 @@ impl Pty {
     }
 }
 
-/// Makes a tty raw before a relay opens it. Otherwise it would echo all received bytes onto the channel.
+/// Makes a tty raw before a relay opens it. Otherwise the tty would echo all received bytes onto the channel.
 pub(crate) fn make_raw(path: &str) {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let tty = open(path, flags, Mode::empty()).unwrap();

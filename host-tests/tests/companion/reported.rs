@@ -15,16 +15,20 @@ use crate::peer::{RX, text};
 use crate::process::{LIMIT, Relay};
 use crate::web::{address, snapshots};
 
-/// Maximum time from a relay's failure to its alarm on the page. The chain notices the failure within 15 s.
+/// Maximum time from a relay's failure to the alarm about it on the page.
+///
+/// The chain notices the failure within 15 s.
 const LOST: Duration = Duration::from_secs(17);
 
-/// Maximum time from a change of a drone's control state until the page shows the change or its alarm. The control
-/// state states if the relay or the pilot controls the drone.
+/// Maximum time until the page shows a change of a drone's control state, or an alarm about it.
+///
+/// The control state states if the relay or the pilot controls the drone.
 const SOON: Duration = Duration::from_secs(2);
 
-/// Maximum distance of a drone on the page from its place at the time of the report, m.
+/// Maximum distance of a drone on the page from its true position at the time of the report, m.
 ///
-/// A drone flies up to 8 m/s, an age is rounded to 0.1 s by each of up to two relays, and a position to 0.25 m.
+/// A drone flies up to 8 m/s. Each of up to two relays rounds the age of a report to 0.1 s, and positions are rounded
+/// to 0.25 m.
 const MOST_ERROR_M: f64 = 2.0 * 0.1 * 8.0 + 0.25;
 
 /// Web page of a ground station, as a browser keeps it open.
@@ -143,7 +147,7 @@ impl Flown {
         self.relay.line("autopilot: setpoint control engaged");
     }
 
-    /// Records the positions that the simulated drone has had up to now.
+    /// Records all positions of the simulated drone up to now.
     fn follow(&mut self) {
         let all = self.drone.so_far().into_iter();
         for ReceivedMessage(place) in all.filter(|it| it.is("PLACE")) {
@@ -152,7 +156,7 @@ impl Flown {
         }
     }
 
-    /// Returns the distance of a reported position from that of the drone at the time `time_s`, m.
+    /// Returns the distance between a reported position and the drone's position at the time `time_s`, m.
     fn error_m(&self, time_s: f64, position: &Value) -> f64 {
         let [x_m, y_m, altitude_m] =
             ["x_m", "y_m", "altitude_m"].map(|axis| position[axis].as_f64().unwrap());

@@ -127,9 +127,9 @@ fn a_bad_key_or_epoch_is_named() {
     }
 }
 
-/// Checks that a relay restarted with an older epoch file is rejected, and joins after the repair.
+/// Checks that a relay restarted with an older epoch file is rejected, and joins after a repair.
 ///
-/// The neighbour's log tells how to repair this: by a larger number in the epoch file.
+/// The repair is a larger number in the epoch file; the neighbour's log states this.
 #[test]
 fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     let mut chain = Chain::on_wires(2, QUIET);

@@ -47,7 +47,7 @@ fn watch(socket: &Path, stop: &AtomicBool) -> StatusStatistics {
     seen
 }
 
-/// Returns the options with relay `index`'s own files: a status socket and a file of membership votes.
+/// Returns the options for the status socket and the file of membership votes of relay `index`.
 fn files(chain: &Chain, index: usize) -> String {
     let file = |name: &str| chain.files.text(&format!("{name}{index}"));
     format!(
@@ -89,7 +89,9 @@ fn round(channel: &Medium, sockets: &[PathBuf], relays: &mut [Relay; 3]) {
     }
 }
 
-/// Resumes reading of the first relay's lines. Returns the number of reports on dropped lines.
+/// Resumes the reading of the first relay's log lines.
+///
+/// Returns the number of log lines that report dropped lines.
 fn reports_of_dropped_lines(first: &Relay, reader: PipeReader, dropped: u64) -> usize {
     let lines = lines_of(reader);
     let end = Instant::now() + LIMIT;

@@ -16,7 +16,9 @@ use crate::files::{Files, status_of, until, write};
 use crate::medium::{Medium, QUIET};
 use crate::process::{LIMIT, Relay};
 
-/// Returns the command-line options of the relay or ground station at `tty`. Three relays and two stations share one channel.
+/// Returns the command-line options of the relay or ground station at `tty`.
+///
+/// Three relays and two stations share one channel.
 fn common(field: &Chain, tty: usize) -> String {
     let socket = field.files.text(&format!("status{tty}"));
     let signed = field.files.signed("key", &format!("epoch{tty}"));
@@ -58,8 +60,9 @@ fn fifo_lines(scene: &Scene, relay: usize) -> String {
     lines
 }
 
-/// Writes an interference power to a file again and again until `is_so` returns true. The writing is repeated because
-/// a ground station reads the file only when it has changed.
+/// Writes an interference power to a file repeatedly until `is_so` returns true.
+///
+/// The writing is repeated because a ground station reads the file only when it has changed.
 fn write_until(level: &str, power_w: f64, mut is_so: impl FnMut() -> bool) {
     let end = Instant::now() + LIMIT;
     while !is_so() {

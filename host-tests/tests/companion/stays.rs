@@ -46,8 +46,9 @@ fn a_vanished_port_returns_and_the_other_one_goes_on() {
     assert!(again.is_empty(), "once each: {again:?}");
 }
 
-/// Checks that a program continues although its output is not read. Cases are a full pipe and queue, a closed pipe,
-/// and `/dev/full`.
+/// Checks that a program continues although its output is not read.
+///
+/// In the three cases the output is a full pipe with a full queue, a closed pipe, or `/dev/full`.
 fn goes_on_where_nobody_reads(program: &Path, options: &str) {
     let (kept, stopped) = std::io::pipe().unwrap();
     let (gone, closed) = std::io::pipe().unwrap();
@@ -116,7 +117,7 @@ fn a_closed_standard_error_is_no_panic() {
     }
 }
 
-/// Checks that clients of the status socket that do not read, or that send data, do not block others.
+/// Checks that clients that do not read the status socket, or that send data, block no other clients.
 #[test]
 fn the_socket_answers_despite_stuck_clients() {
     let files = Files::new();
@@ -239,7 +240,7 @@ fn a_full_disk_is_reported_once_and_ends_no_relay() {
     assert_eq!(first.end().status, Some(0));
 }
 
-/// Checks that a disk that blocks delays the frames that a relay sends, but nothing else.
+/// Checks that a blocked disk delays only the frames that its relay sends, and nothing else.
 ///
 /// In place of a blocked disk, the file for the relay's membership votes is a FIFO that is not read.
 #[test]

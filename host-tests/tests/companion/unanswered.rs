@@ -52,7 +52,9 @@ impl Unanswered {
         assert_eq!(autopilot["state"], "silent", "{autopilot}");
     }
 
-    /// Checks that the report of a silent autopilot is not repeated for 7 s. The companion is nearly idle then.
+    /// Checks that the report of a silent autopilot is not repeated for 7 s.
+    ///
+    /// The companion must be nearly idle during this time.
     fn check_no_repetition(&mut self) {
         let before = self.relay.cost();
         std::thread::sleep(Duration::from_secs(7));
@@ -105,7 +107,9 @@ fn an_unreachable_udp_port_is_logged_once() {
     unanswered.relay.stopped();
 }
 
-/// Checks that a relay reports once that the autopilot at a UDP port does not answer. For example, a PX4 may answer only another program.
+/// Checks that a relay reports once that the autopilot at a UDP port does not answer.
+///
+/// For example, a PX4 may answer only another program.
 #[test]
 fn a_silent_udp_port_is_logged_once() {
     let ports = Ports::apart(1_000);

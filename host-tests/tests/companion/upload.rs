@@ -41,8 +41,9 @@ fn ground(files: &Files, version: &str, more: &str) -> Relay {
     Relay::ground(&format!("{upload} {more}"))
 }
 
-/// Checks that an upload from the transmitter reaches two relays and survives their restarts. This must hold on wires
-/// with and without noise.
+/// Checks that an upload by a ground station at Tx reaches two relays and survives their restarts.
+///
+/// This must hold on wires with and without noise.
 #[test]
 fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     let (loaded, uploaded) = (simulated(&Scenario::default(), 2), simulated(&new(), 2));
@@ -76,7 +77,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
 
 /// Checks that a relay that restarts without its upload file receives the uploaded mission again.
 ///
-/// The first upload came from a ground station at the receiver, on the channel that all share.
+/// The first upload comes from a ground station at the receiver, on the shared channel.
 #[test]
 fn a_relay_without_its_upload_is_offered_it_again() {
     let uploaded = simulated(&new(), 2);
@@ -104,17 +105,20 @@ fn a_relay_without_its_upload_is_offered_it_again() {
     assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
 }
 
-/// State of a wire that a test cuts once a relay decides on a new membership view.
+/// State of a wire that a test cuts when a relay sends its decision on a new membership view.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Wire {
     Open,
-    /// Armed: the wire is intact until the next decision on a membership view. That decision is lost, and cuts the
-    /// wire.
+    /// Armed: intact until the next decision on a membership view is sent.
+    ///
+    /// That decision is lost, and the wire is cut from then on.
     Armed,
     Cut,
 }
 
-/// Creates a wire that is cut when tty 1 sends a decision on a membership view. This happens only while `state` is [`Wire::Armed`].
+/// Creates a wire that is cut when tty 1 sends a decision on a membership view.
+///
+/// A decision cuts the wire only while `state` is [`Wire::Armed`].
 fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     let state = Arc::clone(state);
     let mut deframer = Deframer::new();
@@ -133,7 +137,7 @@ fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     })
 }
 
-/// Checks that the ground station reports the first relay that flies the new mission, and later all.
+/// Checks that the ground station reports when the first relay flies the new mission, and when all do.
 ///
 /// The wire between relays 2 and 3 is cut as soon as relay 3 has decided on the membership view with the mission.
 #[test]
@@ -184,7 +188,9 @@ fn the_ground_reports_progress_until_all_relays_fly() {
     }
 }
 
-/// Returns the contents of an upload file with `config` as version 5. The relays' mission before flight is `base`.
+/// Returns the contents of an upload file with `config` as version 5.
+///
+/// The relays' mission before flight is `base`.
 fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
     let [base, new] = [base, config].map(|scenario| mission::mission(scenario, 1, 1e-4).unwrap().0);
     let upload = Upload::new(&base, 5, *new.config()).unwrap();
@@ -345,7 +351,7 @@ const WRONG: &[&str] = &[
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Wrong options that the ground station refuses only after it has received the mission in flight.
+/// Wrong options that the ground station can refuse only after it has received the relays' mission.
 const UNFIT: &[&str] = &[
     "--new-band 30,300",
     "--new-min-separation 1001",

@@ -44,8 +44,9 @@ fn stored(chain: &Chain, index: usize) -> Option<ViewRecord> {
 
 const STANDS_BY: &str = "restored: this relay's earlier votes on the chain's membership were read from --view-file; on the ground, remove that file before the next flight";
 
-/// Checks that relays killed in a view (membership) of two and restarted form a chain of three. No view number is
-/// used twice.
+/// Checks that relays killed in a membership view of two relays form a chain of three after a restart.
+///
+/// No view number is used twice.
 #[test]
 fn restarted_relays_keep_their_votes() {
     let expected = simulated(&Scenario::default(), 3);
@@ -87,7 +88,7 @@ fn the_unit_does_not_restart_after_permanent_errors() {
     assert!(unit.lines().any(|line| line == setting), "{unit}");
 }
 
-/// Checks that two of three relays get no setpoints if their stored membership view is without them.
+/// Checks that two of three relays get no setpoints if their stored membership view excludes them.
 ///
 /// Without that stored view, the two relays would have a quorum.
 #[test]

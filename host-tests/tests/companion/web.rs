@@ -13,7 +13,7 @@ use crate::medium::QUIET;
 use crate::process::{LIMIT, Relay};
 use crate::pty::Pty;
 
-/// Maximum time to an answer of the station's main loop to a status request, on a busy machine.
+/// Maximum time in which the station's main loop answers a status request, on a busy machine.
 const LATE: Duration = Duration::from_millis(1_500);
 
 /// Returns the address of the page, which the station logs.
@@ -93,7 +93,7 @@ fn a_station_without_a_chain_has_a_page_with_snapshots() {
     assert!(last.contains("stopped"), "{last}");
 }
 
-/// Returns a PMTiles archive with one picture, that of the whole earth.
+/// Returns a PMTiles archive with a single tile: the `picture` of the whole earth.
 fn archive(picture: &[u8]) -> Vec<u8> {
     let metadata = br#"{"attribution":"<b>Somebody</b>"}"#;
     // One entry: tile 0, one tile long, with the length and the offset (plus one) of its picture.

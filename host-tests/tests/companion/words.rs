@@ -60,7 +60,7 @@ fn the_reason_why_a_port_cannot_be_opened_is_logged() {
 
 /// Checks that a relay logs the reason for which it rejects a neighbour's frames, and logs it once.
 ///
-/// The two relays on one wire differ in one option.
+/// Each case has two relays on one wire, with a difference in one option.
 #[test]
 fn reasons_of_rejected_frames_are_logged() {
     let files = Files::new();
@@ -102,7 +102,7 @@ const QUICK: &str = "--probe-after-ms 300 --dead-after-ms 900";
 
 /// Checks that a ground station on a wire names the likely reason for a failed upload.
 ///
-/// The ground station cannot know the true reason, because relays on a wire do not answer strangers, and only log why
+/// The ground station cannot know the true reason. Relays on a wire do not answer unknown senders, and only log why
 /// they reject frames.
 #[test]
 fn on_a_wire_the_ground_names_the_likely_cause() {

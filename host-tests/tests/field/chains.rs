@@ -42,7 +42,7 @@ fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
     }
 }
 
-/// Checks that positions have equal distances: they begin at `first` and are `step` apart.
+/// Checks that the positions `got` begin at `first` and are `step` apart.
 fn evenly(got: &[f64], first: f64, step: f64) {
     for (k, got) in (0..).zip(got) {
         let want = first + step * f64::from(k);

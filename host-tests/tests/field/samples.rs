@@ -114,7 +114,9 @@ fn an_invalid_bound_accepts_no_sample() {
     }
 }
 
-/// Checks that an estimate from two million similar samples is accurate, unlike sums in f32.
+/// Checks that an estimate from two million similar samples is accurate.
+///
+/// Sums in f32 would lose this accuracy.
 #[test]
 fn many_similar_samples_lose_no_precision() {
     let mut estimator = Estimator::new(1.0);
@@ -141,7 +143,7 @@ fn config(cases: u32) -> Config {
     }
 }
 
-/// Draws sample powers of every kind: any f32 bits, and values close to the limits.
+/// Draws sample powers: any f32 bits, values from 0 to 1, powers of two, and values just below 1.
 fn powers() -> impl Strategy<Value = f32> {
     prop_oneof![
         any::<u32>().prop_map(f32::from_bits),

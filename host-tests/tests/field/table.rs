@@ -61,7 +61,9 @@ fn a_field_of_equal_values_is_constant() {
     assert_ne!(ONE, TWO);
 }
 
-/// Creates a field of interference whose table is leaked, because a field borrows its table for good.
+/// Creates a field of interference.
+///
+/// The table is leaked, because a field needs a table that exists until the program ends.
 fn field(points: Vec<FieldPoint>) -> Result<Field, FieldError> {
     Field::try_new(Vec::leak(points))
 }

@@ -130,7 +130,7 @@ fn the_remaining_relays_share_the_frame_after_a_loss() {
     check_shares(&outcome, case.mission().config().reverse, "relay 3 lost");
 }
 
-/// Checks that the time slots of the agreement after a relay's restart fill the whole TDMA frame.
+/// Checks that the time slots fill the whole TDMA frame after a relay's restart and the next agreement.
 #[test]
 fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
     let case = Case::draw(1);
@@ -154,9 +154,10 @@ fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
     }
 }
 
-/// Checks that relays agree first for the common power, and a second time for their own powers.
+/// Checks that relays agree first for the common power, and a second time for their individual powers.
 ///
-/// There is only one agreement if no relay has another power, or if the leader has: then the leader gathers all powers first.
+/// There is only one agreement if all relays have the common power. There is also only one if the leader has another
+/// power: then it gathers all powers first.
 #[test]
 fn the_first_agreement_is_for_the_common_power() {
     let case = Case {
@@ -189,7 +190,7 @@ fn the_first_agreement_is_for_the_common_power() {
     }
 }
 
-/// Checks that the agreed fitted slots deliver the predicted rate, also in both directions.
+/// Checks that the agreed fitted slots deliver the predicted rate, in one direction or in both.
 #[test]
 fn fitted_slots_deliver_the_predicted_rate() {
     let first = number("SEED", 1);

@@ -19,7 +19,7 @@ use uav_relay_tools::plan::solved;
 
 use scenes::{Case, number};
 
-/// Returns every relay's position and slot shares by the solver of `mission`.
+/// Returns the position and the slot shares of every relay, as the solver computes them for `mission`.
 fn fitted(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Vec<(Placement, SlotShares)> {
     let mut solver = Solver::<100, 10>::new(mission).unwrap();
     while solver.step(mission, &seat_of) == Poll::Pending {}
@@ -44,8 +44,9 @@ fn check_limits(mission: &Mission, places: &[Placement]) {
     }
 }
 
-/// Checks that the data rate with relays on the line is close to that of the planner. The rate must be at least 0.999 of the planner's rate
-/// in 99.5 % of the scenes, and at least 0.98 of it in all scenes.
+/// Checks that the data rate with relays on the line is close to that of the planner.
+///
+/// The rate must be at least 0.999 of the planner's rate in 99.5 % of the scenes, and at least 0.98 in all scenes.
 #[test]
 fn places_on_the_line_carry_what_the_shortest_path_carries() {
     let first = number("SEED", 1);
@@ -90,8 +91,9 @@ fn places_on_the_line_carry_what_the_shortest_path_carries() {
     assert!(short * 200 <= shares.len() && shares[0] >= 0.98);
 }
 
-/// Checks that the data rate with free altitudes and offsets is at least that at the common altitude. It must also be at least the rate at
-/// the positions of the best SIR.
+/// Checks that free altitudes and offsets give at least the data rate of the common altitude.
+///
+/// The rate must also be at least that at the positions of the best SIR.
 #[test]
 fn free_places_carry_no_less() {
     let first = number("SEED", 1);
@@ -174,8 +176,9 @@ fn a_full_line_is_placed() {
     }
 }
 
-/// Checks that relays refuse fitted slots without the joint method, or with an unknown interferer. They also refuse fitted slots with the
-/// setting `listen`.
+/// Checks that relays refuse fitted slots without the joint method, or with an unknown interferer.
+///
+/// They also refuse fitted slots with the setting `listen`.
 #[test]
 fn fitted_slots_need_the_joint_method() {
     let config = MissionConfig {

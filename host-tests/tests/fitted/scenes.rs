@@ -102,8 +102,9 @@ impl Case {
         }
     }
 
-    /// Returns the times of the hops for one bit to Rx and `reverse` bits to Tx, in units of 1 / bandwidth. The second list is empty if the
-    /// chain has only the direction to Rx.
+    /// Returns the time that each hop needs for one bit to Rx, and for `reverse` bits to Tx.
+    ///
+    /// Times are in units of 1 / bandwidth. The second list is empty if the chain has only the direction to Rx.
     pub(crate) fn times(&self, places: &[Placement]) -> [Vec<f64>; 2] {
         let scene = Scene::new(&self.scenario, self.relays).unwrap();
         let places: Vec<Place> = places.iter().map(|at| (*at).into()).collect();

@@ -33,8 +33,8 @@ fn draw(seed: u64) -> Case {
 
 /// Checks that plans against several interferers are compared by their true rates, not by SIRs.
 ///
-/// A plan's rate is at least 0.99 of two other rates: at the positions for the hypothetical interferer, and at those of the largest SIR.
-/// `plan --out` accepts the relays' own positions if their rate is at least 0.99 of the plan's rate.
+/// A plan has at least 0.99 of the rate at the positions for the hypothetical interferer (one that stands for all), and
+/// at those of the best SIR. `plan --out` accepts the relays' positions if they have 0.99 of the plan's rate.
 #[test]
 fn plans_against_several_interferers_are_compared_by_their_rates() {
     let (first, all) = (number("SEED", 1), number("COUNT", 12));

@@ -47,7 +47,7 @@ fn records_fill_both_sectors_and_the_newest_is_read() {
     assert_eq!(newest(&mut flash), Some(entry(12)));
 }
 
-/// Checks that a full journal erases the sector that lacks the newest record, and continues there.
+/// Checks that a full journal erases the sector without the newest record, and continues there.
 #[test]
 fn a_full_log_continues_in_the_older_sector() {
     let mut flash = Ram::blank(4 * RECORD, 1);
@@ -106,8 +106,9 @@ fn worn_flash_is_skipped() {
     assert!(!log(&mut none).append(&entry(1), WhenFull::Erase));
 }
 
-/// Checks that a power failure at any moment neither loses stored records nor creates others. The power may fail
-/// during an erase, within a record or within a word.
+/// Checks that a power failure at any moment neither loses stored records nor produces new ones.
+///
+/// The power may fail during an erase, within a record or within a word.
 #[test]
 fn no_record_is_lost_at_any_power_failure() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(37));

@@ -33,7 +33,7 @@ fn the_stated_number_of_views_is_stored_before_an_erase() {
 
 /// Checks that the previous record stays valid if the power fails while a vote is recorded.
 ///
-/// That is right because the new vote was not sent yet.
+/// The previous record is still right, because the relay has not yet sent the new vote.
 #[test]
 fn after_a_torn_record_the_previous_one_is_read() {
     for written in 1..WORDS + OVERHEAD {

@@ -50,8 +50,8 @@ fn random_field(rng: &mut impl Rng) -> StochasticLink {
 
 /// Returns the fewest relays that meet the linear SIR `target`, with all relays at grid points.
 ///
-/// The grid divides the line into 4000 steps. `longer` is a tolerance: a hop may be longer than `target` permits by
-/// that many steps. Returns 0 if more than `most` relays are needed.
+/// The grid divides the line into 4000 steps. As a tolerance, a hop may be `longer` steps longer than `target` permits.
+/// Returns 0 if more than `most` relays are needed.
 fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> usize {
     const STEPS: usize = 4000;
     let (d, relay) = (link.distance_m, link.relays[0]);
@@ -157,8 +157,8 @@ fn the_fewest_in_a_field_are_those_of_a_grid_search() {
 
 /// Checks that the best target SIR of N identical relays in a field is the known optimum.
 ///
-/// In a constant field the target must equal the closed form. In other fields it must be at least that of Algorithm 4, and a slightly
-/// higher target must be impossible on a grid.
+/// In a constant field the target must equal the closed form. In other fields it must be at least that of Algorithm 4,
+/// and a slightly higher target must be impossible on a grid.
 #[test]
 fn identical_relays_in_a_field_are_optimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));
@@ -201,7 +201,7 @@ fn identical_relays_in_a_field_are_optimal() {
     assert!(above > 5);
 }
 
-/// Checks that the least number of relays in a field is not reported as proven if their powers differ.
+/// Checks that a least number of relays in a field is not called proven if the relays' powers differ.
 ///
 /// Algorithm 4, which finds this number, may then miss a chain with fewer relays.
 #[test]

@@ -51,10 +51,10 @@ fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
     last.sir_rx(x).unwrap()
 }
 
-/// Draws a target SIR: 1e-4 to 1.2 times the highest SIR that both the first and the last hop can have.
+/// Draws a target SIR: 1e-4 to 1.2 times the highest SIR that the first and the last hop both can have.
 ///
-/// This range gives targets that need one to several dozen relays, and some that no chain meets. Returns `None` if
-/// the last hop has no SIR.
+/// This range gives targets that need one to several dozen relays, and some that no chain meets. Returns `None` if the
+/// last hop has no SIR.
 fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
     let d = link.distance_m;
     let first = (0..200)
@@ -173,8 +173,9 @@ fn with_a_separation_a_proven_number_is_the_fewest() {
     assert!(proven > 500 && none > 100);
 }
 
-/// Checks the highest target SIR that [`Most`] reports over all numbers of relays. A chain meets this target. Without a
-/// minimum separation, no number of relays meets a target higher by 0.1 %.
+/// Checks that [`Most`] reports the highest target SIR over all numbers of relays.
+///
+/// A chain meets this target. Without a minimum separation, no number of relays meets a target that is 0.1 % higher.
 #[test]
 fn no_number_of_relays_exceeds_the_reported_maximum() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(603));

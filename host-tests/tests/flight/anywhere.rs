@@ -65,7 +65,7 @@ fn starts(rng: &mut ChaCha8Rng, tame: bool) -> Vec<Point> {
     starts
 }
 
-/// Draws a mission upload that moves Tx or Rx, and so turns the line between them by up to 80 degrees.
+/// Draws a mission upload that moves Tx or Rx, and so turns the line Tx-Rx by up to 80 degrees.
 fn turned(rng: &mut ChaCha8Rng, setup: &Setup, axis: &Axis) -> UploadSpec {
     let config = *setup.mission.config();
     let angle = rng.random_range(-80.0_f64..=80.0).to_radians();
@@ -163,10 +163,10 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns true if all drones must arrive, because their order along the line is certain all the time.
+/// Returns true if all drones must arrive, because their order along the line is certain at all times.
 ///
-/// It is certain if the starts are farther apart than the position errors, every pilot returns the drone, silent
-/// relays return soon, and no mission is uploaded.
+/// The order is certain if the starts are farther apart than the position errors, pilots who take over return their
+/// drones, silent relays return soon, and no mission is uploaded.
 fn is_orderly(setup: &Setup) -> bool {
     let Some(spec) = &setup.fleet else {
         return false;

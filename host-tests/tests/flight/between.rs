@@ -18,7 +18,7 @@ fn undisturbed(setup: &Setup) -> Vec<f32> {
     ends(&run(clean).unwrap())
 }
 
-/// Checks that a relay that was switched off for a while gets its position back.
+/// Checks that a relay that was switched off for a while gets its former position back.
 ///
 /// While the relay is silent its drone still hovers. The neighbours move closer, but keep clear of the drone.
 #[test]
@@ -48,8 +48,9 @@ fn a_relay_returning_between_two_others_gets_its_position() {
     }
 }
 
-/// Checks that no drone moves if two neighbouring drones start in each other's position. The other drones do not know
-/// of the swap.
+/// Checks that no drone moves if two neighbouring drones start in each other's position.
+///
+/// The other drones do not know of the swap.
 #[test]
 fn while_two_drones_are_in_the_wrong_order_all_stay() {
     for first in 0..7 {

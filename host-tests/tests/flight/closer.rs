@@ -17,8 +17,8 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
 
 /// Checks that drones reach agreed positions that are closer along x than the minimum separation.
 ///
-/// In space they keep the separation, by their altitudes or lateral offsets. Such positions come from the scenes
-/// among 200 random ones in which the joint method agrees on them.
+/// In space the drones keep the separation, by their altitudes or lateral offsets. Among 200 random scenes, the test
+/// uses those in which the joint method agrees on such positions.
 #[test]
 fn drones_get_to_positions_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));

@@ -8,7 +8,7 @@ use super::*;
 /// Longest time from the last repair of the chain until all relays are in one membership view, s.
 const SOON_S: f64 = 120.0;
 
-/// Returns all pairs of different links to cut. A link is given by the index of the relay before it.
+/// Returns all pairs of different links to cut. A link has the index of the relay at its end toward Tx.
 ///
 /// The first link of a pair is cut first.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {
@@ -17,7 +17,7 @@ fn pairs() -> impl Iterator<Item = (u16, u16)> {
         .filter(|(first, second)| first != second)
 }
 
-/// Checks that all relays are in one membership view soon after two overlapping cuts of the chain.
+/// Checks that all relays are in one membership view soon after two cuts that overlap in time.
 ///
 /// The four numbers of a row are times in s: begin and end of the first cut, then begin and end of the second cut. In
 /// the last row, the cuts heal within a second of each other.

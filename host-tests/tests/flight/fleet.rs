@@ -15,10 +15,12 @@ const NOISE_M: f64 = 0.3;
 /// Largest standard deviation of gusts, m/s.
 const GUST_MPS: f64 = 0.3;
 
-/// Position error configured in the motion guard, m: noise, gusts and overshoot.
+/// Position error configured in the motion guard, m. It covers noise, gusts and overshoot.
 const HOVER_M: f64 = 1.5;
 
-/// Permitted shortfall of the minimum separation, m: bias and hovering error of both drones.
+/// Permitted shortfall of the distance from the minimum separation, m.
+///
+/// It is the bias and the hovering error of both drones.
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
 /// Time of the last random event, s.
@@ -108,7 +110,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns a flight's first violated rule, if any, its smallest distance of drones, m, and duration, s.
+/// Returns a flight's first violated rule, if any, least distance of drones, m, and duration, s.
 fn judged(seed: u64) -> (Option<String>, f64, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

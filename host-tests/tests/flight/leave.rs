@@ -11,11 +11,10 @@ const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
     up_m: 25.0,
 };
 
-/// Returns the relays' lateral offsets and altitudes, m, during and long after a cut of the chain. The cut is
-/// downstream of relay 3.
+/// Returns the relays' lateral offsets and altitudes, m, during a cut of the chain and long after it.
 ///
-/// Relays without a quorum leave the line, sideways and upward. With `room`, the motion guard permits the positions
-/// to which they leave.
+/// The cut is downstream of relay 3. Relays without a quorum leave the line, sideways and upward. If `room` is true,
+/// the motion guard permits the positions to which they leave.
 fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
     [seconds(110), seconds(300)].map(|end| {
         let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(1));

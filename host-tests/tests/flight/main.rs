@@ -43,16 +43,17 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
     setup
 }
 
-/// Returns the smallest permitted distance between drones, m, each started at most `starts` times.
+/// Returns the smallest permitted distance of two drones, m, if each starts at most `starts` times.
 ///
-/// The motion guard keeps the separation between reported positions. The reported position of each drone has a
-/// constant error, and the random error of one report for each start.
+/// The motion guard keeps the separation between reported positions. The reported position of each drone has a constant
+/// error, and the random error of one report for each start.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }
 
-/// Returns the time when the last of eight relays accepted their final common membership view. Returns `None` if the
-/// relays differ.
+/// Returns the time when the last of eight relays accepted their final common membership view.
+///
+/// Returns `None` if the relays do not end in the same view of eight.
 fn together(outcome: &Outcome) -> Option<Instant> {
     let view = outcome.relays[0].view;
     let all = outcome

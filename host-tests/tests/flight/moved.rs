@@ -13,9 +13,11 @@ use super::*;
 
 /// Random error of each report of a drone's position, m.
 const NOISE_M: f64 = 0.3;
-/// Error of the hovering position that is configured in the motion guard, m.
+/// Hovering error of a drone that is configured in the motion guard, m.
 const HOVER_M: f64 = 1.5;
-/// Permitted shortfall of the separation, m: constant error and hovering error of both drones.
+/// Permitted shortfall of the distance from the minimum separation, m.
+///
+/// It is the constant error and the hovering error of both drones.
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
 /// Largest displacement of the receiver along the line, m.
@@ -92,7 +94,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns the violated rule of a random flight, if any, and the smallest distance between drones, m.
+/// Returns the violated rule of a random flight, if any, and the smallest distance of two drones, m.
 fn judged(seed: u64) -> (Option<String>, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

@@ -19,7 +19,9 @@ use super::*;
 
 const STORM_S: u64 = 180;
 
-/// Draws begin and end of a fault that begins in the storm, the phase of random faults. The end is never `None`.
+/// Draws the begin and the end of a fault. The end is never `None`.
+///
+/// The fault begins in the storm, which is the phase of random faults.
 fn span(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     let from = rng.random_range(0..STORM_S * 1_000);
     let until = from + rng.random_range(2_000..100_000);

@@ -8,7 +8,7 @@ use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Place};
 
-/// Returns true for a frame with the message by which Algorithm 2 ends its last round.
+/// Returns true for a frame with the message that ends Algorithm 2 after its last round.
 pub(crate) fn is_stop(frame: &Frame) -> bool {
     frame.is(|message| matches!(message, Message::Token(token) if token.turn == AdjustStep::Stop))
 }
@@ -56,7 +56,7 @@ impl Chain {
         self.bench.relays[at] = relay.unwrap();
     }
 
-    /// Delivers the next frame, or else advances to the next timer.
+    /// Delivers the next frame, or advances to the next timer if no frame is in transit.
     pub(crate) fn step(&mut self) {
         self.bench.step(Instant::from_micros(u64::MAX));
     }
@@ -69,7 +69,7 @@ impl Chain {
         Some(took.as_micros().div_ceil(1000))
     }
 
-    /// Returns the fraction by which the chain's SIR exceeds its target, and the relays' least distance, m.
+    /// Returns by which fraction the SIR exceeds its target, and the least distance of relays, m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self

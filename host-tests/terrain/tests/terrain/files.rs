@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
 
-/// GeoTIFF that a test writes: its north-west grid point, cell size, EPSG code, size and nodata value.
+/// GeoTIFF for a test: north-west grid point, cell size, EPSG code, numbers of cells and nodata value.
 pub(crate) struct Raster {
     pub(crate) corner: [f64; 2],
     pub(crate) cell: [f64; 2],

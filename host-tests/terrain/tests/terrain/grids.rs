@@ -61,7 +61,9 @@ fn heights_are_interpolated_within_and_between_files() {
     assert!((srtm.height_m(48.0, 9.0).unwrap() - plane(9.0, 48.0)).abs() < 0.01);
 }
 
-/// Converts to UTM coordinates by Krüger's series to the third order, independently of the crate.
+/// Converts to UTM coordinates by Krüger's series to third order.
+///
+/// The conversion is independent of the tested crate.
 pub(crate) fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
     let n: f64 = 1.0 / (2.0 * 298.257_223_563 - 1.0);
     let alpha = [
@@ -281,7 +283,7 @@ fn unusable_files_and_places_are_named() {
     }
 }
 
-/// Checks that overlapping files whose heights differ too much are refused, whichever is named first.
+/// Checks that overlapping files whose heights differ too much are refused, in either order.
 #[test]
 fn files_that_contradict_each_other_are_named_with_the_place_and_both_heights() {
     let folder = folder();
@@ -412,7 +414,9 @@ fn geographic(east: f64, north: f64) -> [f64; 2] {
     [lat, lon]
 }
 
-/// Reads a real elevation model, if there is one. The model's file has no coordinate system, so the test adds one.
+/// Checks that a real elevation model is read; skipped if Cargo has not unpacked its package.
+///
+/// The model's file has no coordinate system, so the test adds one.
 #[test]
 fn a_real_elevation_model_is_read() {
     let Some(original) = zurich() else {

@@ -12,7 +12,9 @@ use crate::{rng, seeds};
 
 const LENGTHS_KM: [f64; 4] = [83.07993853, 132.315397, 17.39688966, 40.51112702];
 
-/// Two antenna heights above the ground, m, and frequency, MHz, of the five links over each profile.
+/// Five links that the ITU's examples have over each profile.
+///
+/// A link has the heights of its two antennas above the ground, m, and a frequency, MHz.
 const LINKS: [[f64; 3]; 5] = [
     [30.0, 30.0, 1000.0],
     [50.0, 10.0, 2500.0],
@@ -21,7 +23,9 @@ const LINKS: [[f64; 3]; 5] = [
     [70.0, 5.0, 150.0],
 ];
 
-/// Published losses of the ITU's examples: La, Ls, Lsph, and the resulting loss, dB.
+/// Published losses of the ITU's examples, dB: La, Ls, Lsph and the resulting loss.
+///
+/// La is for the actual profile, Ls for the smooth profile, and Lsph for the spherical earth.
 const PUBLISHED: [[f64; 4]; 20] = [
     [32.84284766, 13.74840484, 15.3485837, 34.44302652],
     [37.229036, 18.5970601, 23.6973069, 42.32928281],

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 /// Profile and link in the units of the ITU Recommendation.
 pub(crate) struct Path {
-    /// Distances of the profile's points, km, from 0.
+    /// Distances of the profile's points from the first point, km.
     pub(crate) d: Vec<f64>,
     /// Heights of the profile's points above the sea, m.
     pub(crate) h: Vec<f64>,
@@ -103,8 +103,8 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
 
 /// Returns the diffraction loss of the smooth earth, dB.
 ///
-/// A bisection finds the point at which the line of sight is closest to the earth. Seen from that point, both antennas
-/// have the same elevation angle, as in a reflection.
+/// A bisection finds the point at which the line of sight is closest to the earth. There both antennas have the same
+/// elevation angle, as at a point of reflection.
 fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {
     let horizon = (2.0 * AE_KM / 1000.0).sqrt() * (h1.sqrt() + h2.sqrt());
     if d_km >= horizon {

@@ -24,7 +24,7 @@ const WAVE_M: f64 = 0.125;
 
 /// Plain with narrow peaks, each of a single grid point.
 ///
-/// The surface of the plain is computed here, independently of the planner.
+/// `Peaks` computes the surface of the plain itself, independently of the planner.
 struct Peaks {
     corner: [f64; 2],
     cell: [f64; 2],
@@ -34,7 +34,7 @@ struct Peaks {
 }
 
 impl Peaks {
-    /// Draws random peaks near a line. The elevation files are two, side by side.
+    /// Draws random peaks near a line. The elevation data are in two files, side by side.
     fn new(rng: &mut impl rand::Rng, ends: [[f64; 2]; 2], is_utm: bool) -> Self {
         let at = ends.map(|[lat, lon]| {
             if is_utm {
