@@ -24,10 +24,10 @@ const MAX_RELAYS: u8 = 5;
 /// Maximum number of timeouts handled by one operation.
 const MAX_WAKES: u8 = 64;
 
-/// Fuzz target. Reads `data` as a mission, a relay's settings, and operations on this relay.
+/// Fuzz target. Reads `data` as a mission, the settings of one relay, and operations on this relay.
 ///
 /// # Panics
-/// The relay breaks a rule that the module `watch` checks, or an intact frame is not counted exactly once.
+/// If the relay breaks a rule that the module `watch` checks, or does not count an intact frame exactly once.
 pub fn relay(data: &[u8]) {
     _ = flown(data);
 }
@@ -58,9 +58,10 @@ struct Bench {
     mission: Mission,
     wiring: Wiring,
     now: Instant,
-    /// Simulated neighbours upstream and downstream.
+    /// Simulated neighbours of the relay: upstream, then downstream.
     ///
-    /// An entry is `None` if the relay does not require tags, or if that neighbour does not know the relay's nonce.
+    /// An entry is `None` if the relay does not require tags (signatures), or if that neighbour has not received the
+    /// relay's nonce.
     members: [Option<Member>; 2],
 }
 
@@ -121,10 +122,10 @@ impl Bench {
         }
     }
 
-    /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake.
+    /// Returns the node at `side` (0 upstream, 1 downstream) after a handshake, if this node is Tx or Rx.
     ///
-    /// `None` if this neighbour is a relay. The relay only answers handshakes of Tx and Rx, so Tx or Rx sends the first
-    /// one.
+    /// `None` if it is a relay, or without tags (signatures). The tested relay answers handshakes of Tx and Rx, but
+    /// never starts one with them.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();
@@ -141,9 +142,9 @@ impl Bench {
         heard.map(|member| member.restarted())
     }
 
-    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream), and delivers its handshake.
+    /// Sets the simulated neighbour at `side` (0 upstream, 1 downstream), and delivers its handshake.
     ///
-    /// With `None` the relay has no neighbour at this side any more.
+    /// `None` removes the neighbour at this side.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -188,8 +189,8 @@ impl Bench {
 
     /// Delivers arbitrary bytes to the relay.
     ///
-    /// If they contain a valid handshake, the relay's nonces change, and the simulated neighbours, which do not know
-    /// the new nonces, are removed.
+    /// A valid handshake in the bytes changes the relay's nonces. The simulated neighbours do not know the new nonces,
+    /// so they are removed then.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
@@ -238,7 +239,9 @@ impl Bench {
         self.watched.sample(self.now, sample, count);
     }
 
-    /// Reports a present or past position of the drone, or sometimes that lost neighbours have landed.
+    /// Reports a present or past position of the drone.
+    ///
+    /// Sometimes it reports instead that the lost relays on one side have landed.
     fn position(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         if how >= 0xF0 {
@@ -256,9 +259,10 @@ impl Bench {
         self.watched.position(self.now, at, place);
     }
 
-    /// Delivers a message with a valid CRC. Header and port are mostly those of a neighbour.
+    /// Delivers a message with a valid CRC.
     ///
-    /// Sometimes one of the two has a different value.
+    /// Header and port are mostly those of a neighbour. Sometimes either the port or one field of the header is
+    /// different.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);
@@ -399,7 +403,7 @@ impl Bench {
     }
 }
 
-/// Returns the number of accepted and rejected frames, by the relay's counters.
+/// Returns the number of frames that the relay has counted, accepted or rejected.
 ///
 /// `key` is true if the relay has a signing key.
 fn frames(stats: &Stats, key: bool) -> u64 {

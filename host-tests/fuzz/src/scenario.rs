@@ -10,7 +10,8 @@ const RELAYS: [u16; 4] = [1, 3, 8, 1000];
 /// Fuzz target. Reads `data` as the text of a scenario file; ignores any text that is not UTF-8.
 ///
 /// # Panics
-/// An error text has several lines, a number is out of range, or a mission has a number that is not finite.
+/// If an error text has several lines, a number of the scenario is out of range, or a mission has a number that is not
+/// finite.
 pub fn scenario(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else {
         return;

@@ -12,9 +12,9 @@ use super::input::Input;
 
 /// Interference along x in some missions: the same at every x.
 ///
-/// A `Field` borrows its points until the program ends, so these are constants.
+/// It is a constant like the fields below, because a `Field` borrows its points until the program ends.
 const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
-/// Interference along x in some missions: slightly uneven.
+/// Interference along x in some missions: differs by less than a fifth between positions.
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
 /// Interference along x in some missions: changes by a factor of 10 000 within 10 m.
 const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
@@ -37,8 +37,8 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
 
 /// Creates a mission of 1 to `most` relays; `None` if its parameters are rejected.
 ///
-/// Half of the missions are the paper's scenario with one change. These missions take few bytes of input, so the
-/// remaining bytes reach many states of the chain. In the other half, every parameter is from its whole range.
+/// Half of the missions are the paper's scenario with one change. They take few bytes of the input, so that many bytes
+/// remain for operations on the relays. In the other half, every parameter is drawn from its whole range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     let drawn = input.byte();
     let (kind, variant) = (drawn % 14, drawn / 14 % 8);
@@ -62,7 +62,9 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// Returns the paper's scenario with the change `kind`; `None` if there is no such change.
+/// Returns the paper's scenario with change number `kind`; `None` for a number without a change.
+///
+/// Number 0 is the scenario without any change.
 fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     let paper = MissionConfig {
         relays,
@@ -174,7 +176,7 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
     })
 }
 
-/// Reads a position at any altitude, mostly between Tx and Rx and in the lateral range.
+/// Reads a drone's position: at any altitude, mostly between Tx and Rx and in the lateral range.
 pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, config.distance_m)),
@@ -192,7 +194,7 @@ pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     }
 }
 
-/// Reads an interferer with x between Tx and Rx, at Rx or outside, and y of 0 or any other value.
+/// Reads an interferer: x is between Tx and Rx, at Rx or outside, and y is 0 or not.
 ///
 /// `distance_m` is the distance from Tx to Rx, m.
 fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {

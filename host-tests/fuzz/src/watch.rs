@@ -17,15 +17,15 @@ use frames::Frames;
 
 pub use frames::NETWORK;
 
-/// Maximum number of frames that a relay may have to send at once.
+/// Maximum number of frames that a relay may have ready to send at the same time.
 ///
-/// The terms are, in the order of FORMAT.md: message of a pass and busy notice; view decision; lease renewal and its
-/// answer; eight messages for each side; claim to a node number and its answer; handshakes for eight nodes.
+/// The terms, as in FORMAT.md: message along the chain and busy notice; view decision; lease renewal and its answer;
+/// eight messages for each side; claim to a node number and its answer; handshakes for eight nodes.
 const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
 const MOST_EVENTS: usize = 14;
 
-/// Minimum length of a frame whose CRC is computed, bytes on the wire: header, no body, CRC.
+/// Minimum length of a frame whose CRC a relay computes, bytes on the wire: header and CRC only.
 const LEAST_CHECKED: usize = 16;
 
 /// Minimum length of a frame with a message (a Busy message), bytes on the wire.
@@ -60,9 +60,9 @@ pub struct Watched {
     frames: Frames,
     /// Number of bytes received at each port since the last delimiter.
     begun: [usize; 3],
-    /// View and number of the pass that has given the relay its position; `None` if unknown.
+    /// View and number of the pass from which the relay's agreed position comes; `None` if unknown.
     ///
-    /// A pass is a message along the chain and back.
+    /// A view is a membership of the chain. A pass is a message along the chain and back.
     held: Option<(ViewId, u16)>,
     flown: MissionConfig,
 }
@@ -178,7 +178,7 @@ impl Watched {
         heap::without_allocation(|| self.relay.handle_position(now, place, at));
     }
 
-    /// Reports that the lost relays at `side` have landed.
+    /// Reports that all lost relays on this `side` of the relay have landed.
     pub fn forget(&mut self, now: Instant, side: Side) {
         heap::without_allocation(|| self.relay.clear_lost(now, side));
     }
@@ -189,7 +189,7 @@ impl Watched {
         _ = heap::without_allocation(|| self.relay.handle_upload(now, upload));
     }
 
-    /// Starts a new agreement, if the relay leads the chain.
+    /// Makes the relay start a new agreement on positions, if it leads the chain.
     pub fn restart(&mut self, now: Instant) {
         heap::without_allocation(|| self.relay.restart(now));
     }
@@ -235,10 +235,10 @@ impl Watched {
         (sent, events)
     }
 
-    /// Checks the relay's view (membership of the chain).
+    /// Checks the relay's view (membership of the chain) and its number.
     ///
-    /// View numbers must rise, and each view must be reported and counted. The view must include the relay's index, and
-    /// its neighbours the indices before and after.
+    /// View numbers must rise, and each new view must be reported and counted. The relay's index must be in the view.
+    /// Node numbers must rise from the upstream neighbour over the relay to the downstream neighbour.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -269,7 +269,7 @@ impl Watched {
     /// Checks the relay's setpoint, and that each of its changes is reported.
     ///
     /// Without a collision guard the setpoint must be the agreed position. With a guard it must be in the geofence, or
-    /// no farther outside than before.
+    /// no farther outside than the previous setpoint.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);

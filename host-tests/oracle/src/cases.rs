@@ -5,9 +5,9 @@ use serde_json::Value;
 
 use crate::reference::{Link, Relay};
 
-/// Optimum (linear SIR) of the default scenario, for each number of relays.
+/// Number of relays, and best SIR (linear) of such a chain in the default scenario.
 ///
-/// An independent program has computed it to nine digits.
+/// An independent program has computed the SIRs to nine significant digits.
 pub const OPTIMA: [(u16, f64); 12] = [
     (1, 1.490_121_51),
     (2, 1.616_583_02),
@@ -83,7 +83,7 @@ struct File {
 /// Returns all reference cases, in the order of the file.
 ///
 /// # Errors
-/// If the built-in file does not parse.
+/// If the file `data/reference.json`, which is part of the program, does not parse.
 pub fn load() -> Result<Vec<Case>, serde_json::Error> {
     serde_json::from_str::<File>(include_str!("../data/reference.json")).map(|file| file.cases)
 }

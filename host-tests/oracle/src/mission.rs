@@ -9,11 +9,11 @@ use uav_relay_scenario::scene::{self, Corridor, Scene};
 use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Relay};
 
-/// Converts a reference link to a mission, and to the profiles of relays that differ from the first.
+/// Converts a reference link to a mission, and to the profiles that differ from the first relay's.
 ///
-/// A profile is an altitude and a power. The mission has the first relay's profile. Each other profile has the index of
-/// its relay, from 1. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay would reject a
-/// number.
+/// A profile is an altitude and a power. The first relay's profile is the mission's common profile. Each returned
+/// profile comes with the index of its relay, from 1. `tolerance` is the relative tolerance of the mission's SIR.
+/// `None` if a relay would reject a parameter.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     let channel = Channel::new(
@@ -56,7 +56,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
 
 /// Converts a reference link to the planner's scene; `None` if the link has no relays.
 ///
-/// The range of altitudes in the scene is the altitude of the first relay alone.
+/// The lowest and the highest altitude of the scene are both the altitude of the first relay.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
     let relay = |station: &Relay| scene::Relay {
@@ -86,9 +86,10 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
     })
 }
 
-/// Converts a link of equal relays, with interference known only along the line Tx-Rx, to a mission.
+/// Converts a link of equal relays in random interference to a mission.
 ///
-/// `min_separation_m` is the minimum distance between two relays, m. `None` if a relay would reject a number.
+/// The link has the interference only for points on the line Tx-Rx. `min_separation_m` is the minimum distance between
+/// two relays, m. `None` if a relay would reject a parameter.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link
@@ -133,12 +134,12 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
 
 /// Carrier frequency, Hz, at which the free-space factor (4 pi f / c)^2 is 1.
 ///
-/// An excess loss then equals the path-loss factor.
+/// At this frequency a link's path-loss factor is equal to its excess loss.
 const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 
-/// Rounds every number of `link` to f32, as in a relay's mission.
+/// Rounds every number of `link` to f32, the precision of a relay's mission.
 ///
-/// A comparison then tests a relay's arithmetic, and not the rounding of its inputs.
+/// A comparison of the reference with a relay then tests the relay's arithmetic, not the rounding of its parameters.
 pub fn as_relays_know_it(link: &Link) -> Link {
     let round = |value: f64| f64::from(narrow(value));
     Link {

@@ -40,7 +40,7 @@ pub struct Optimum {
 /// Recorded problem with its best known chain.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Name of the test that draws this problem, with its random stream, such as `joint_method own 7`.
+    /// Names of the test that draws this problem and of its random stream, such as `joint_method own 7`.
     pub set: String,
     /// Link, and the corridor in which its relays choose positions.
     ///
@@ -142,9 +142,9 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a problem as f32 numbers. They identify the problem in the file.
+/// Returns the parameters that identify a problem in the file, as f32 numbers.
 ///
-/// The altitudes of `link` are left out, because relays choose their altitudes in these problems.
+/// The altitudes in `link` are not among them, because relays choose their altitudes in these problems.
 fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {
     let common = [
         link.distance_m,
@@ -189,7 +189,7 @@ pub fn all() -> Result<&'static [Record]> {
 /// `None` if no chain has a positive SIR and keeps the minimum separation.
 ///
 /// # Errors
-/// If the problem is not recorded: `SEED` and `COUNT` of a test must select recorded problems.
+/// If the problem is not recorded. `SEED` and `COUNT` must be such that a test draws only recorded problems.
 pub fn optimum(
     link: &Link,
     corridor: Corridor,

@@ -11,8 +11,9 @@ use uav_relay_sim::cli::Prepared;
 use uav_relay_sim::report::seconds;
 use uav_relay_sim::simulator::outcome::{Outcome, Shot, Transmission};
 
-/// Maximum number of pictures of the chain in a recording. If there are more, pictures that are close in time are
-/// merged.
+/// Maximum number of states of the chain in a recording.
+///
+/// If there are more states, states that are close in time are merged.
 const STANDS: usize = 600;
 
 /// Maximum number of frames in a recording; later frames are left out.
@@ -20,7 +21,7 @@ const FRAMES: usize = 20_000;
 
 #[derive(Serialize)]
 pub(crate) struct FilmTold {
-    /// Pictures of the chain in order of time: one for each time at which something has changed.
+    /// States of the chain in order of time: one for each time at which something has changed.
     stands: Vec<StandTold>,
     /// Frames that were sent, each with its time in s, sender's index, and direction.
     ///
@@ -35,15 +36,16 @@ struct StandTold {
     ///
     /// The position is `None` until the relay has agreed on a position.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
-    /// SIR of every hop, linear, from Tx to Rx. The hops lead over the relays that are on and have a position. Empty if
-    /// there are no such relays.
+    /// SIR of every hop, linear, from Tx to Rx.
+    ///
+    /// The hops connect the relays that are on and have a position. Empty if there are no such relays.
     sirs: Vec<f32>,
-    /// SIR of every hop in the direction from Rx to Tx, linear; empty for data in one direction.
+    /// SIR of every hop in the direction from Rx to Tx, linear; empty if data flows only from Tx to Rx.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     backs: Vec<f32>,
-    /// Number of frames sent by all nodes from the start until this time.
+    /// Number of frames sent by all nodes from the start of the run until this state's time `at_s`.
     messages: u64,
-    /// Estimated interferer: power in W, x and y in m. `None` if no interferer is estimated.
+    /// Interferer as the relays estimate it: power in W, x and y in m; `None` without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     believed: Option<[f32; 3]>,
 }
@@ -52,8 +54,9 @@ struct StandTold {
 struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,
     messages: u64,
-    /// New interference estimate of the relays at this time. `None` if it has not changed, or if the relays do not
-    /// measure.
+    /// New interference estimate of the relays.
+    ///
+    /// `None` if the estimate has not changed at this change's time, or if the relays do not measure.
     believed: Option<InterferenceEstimate>,
 }
 
@@ -82,9 +85,9 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
     thinned(changes)
 }
 
-/// Merges changes that are close in time, so that a recording has at most [`STANDS`] pictures.
+/// Merges changes that are close in time, so that a recording has at most [`STANDS`] states.
 ///
-/// The merged change has the time of the last of its changes.
+/// A merged change has the time of the latest change in it.
 fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
     let mut all = all;
     let mut apart_us = 1_000;

@@ -42,9 +42,10 @@ struct RunOutput {
 
 /// Runs a simulated chain and returns the result as one JSON object.
 ///
-/// The object has up to three members: `report`; `film`, the recording, if `film` is true; `wrong`, an error line, if
-/// the run has failed. `options` are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML
-/// text.
+/// The object has up to three members: `report`; `film`, the recording, if the argument `film` is true; `wrong`, a line
+/// of text with the error, if the run has failed.
+///
+/// `options` are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML text.
 #[wasm_bindgen]
 #[must_use]
 pub fn chain(options: &str, scenario: &str, film: bool) -> String {

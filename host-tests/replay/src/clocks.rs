@@ -16,20 +16,23 @@ use uav_relay_capture::Direction;
 
 use crate::recording::{Frame, Recording, retain};
 
-/// Length of a time window with one clock offset, s. Clocks are assumed to drift by at most 100 ppm: 2 ms in a window.
+/// Length of a time window in which a file's clock is assumed to have a constant offset, s.
+///
+/// Clocks are assumed to drift by at most 100 ppm: 2 ms in a window.
 const WINDOW: f64 = 20.0;
 
-/// Minimum step of a clock, s.
+/// Minimum step (sudden change) of a file's clock, s.
 ///
-/// A step is a change of the clock offset from one common frame to the next, or a time that goes back.
+/// A step is a change of the clock's offset between two successive frames that other files have, too, or a decrease of
+/// the time from one frame to the next.
 const STEP: f64 = 2.0;
 
-/// Maximum time between two files of one flight that have no common frame, s.
+/// Maximum time between two files of one flight, s, if no frame is in both files.
 ///
-/// The same limit applies to two consecutive frames of one file.
+/// The same limit applies to the time between two consecutive frames of one file.
 const APART: f64 = 3_600.0;
 
-/// Relation of a file's clock to the first file's clock.
+/// Offset of a file's clock from the first file's clock, and the number of frames that determine it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
     /// Name of the capture file.
@@ -40,9 +43,9 @@ pub struct Alignment {
     pub offset_s: [f64; 2],
 }
 
-/// Part of a file without a step of its clock, from the frame `from` on.
+/// Part of a file between two steps of its clock. It begins at the frame with the index `from`.
 ///
-/// `offsets` has pairs of a time of the file's clock and the offset at that time, s.
+/// `offsets` has pairs, s: a time of the file's clock, and the offset of the clock at that time.
 struct Segment {
     from: usize,
     offsets: Vec<(f64, f64)>,
@@ -62,9 +65,8 @@ impl Segment {
 
 /// Bounds of the clock offset in a time window, s.
 ///
-/// They come from frames sent in one file and received in the other.
-///
-/// `equal` has the offsets that follow from all other frames.
+/// The bounds `least` and `most` come from frames that one file has as sent and the other file as received. `equal` has
+/// the offsets computed from all other common frames.
 #[derive(Default)]
 struct Window {
     times: Vec<f64>,
@@ -100,7 +102,7 @@ impl Window {
     }
 }
 
-/// Returns the index of each frame, by the frame's bytes; `None` if the frame occurs several times.
+/// Returns a map from each frame's bytes to its index; `None` if several frames have the same bytes.
 fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     let mut known = HashMap::new();
     for (index, frame) in frames.iter().enumerate() {
@@ -110,9 +112,10 @@ fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     known
 }
 
-/// Frames of the aligned files by their bytes: time of the reference clock, and direction.
+/// Map from the bytes of a frame in the aligned files to its time and direction.
 ///
-/// If a frame was both sent and received, the sent one counts.
+/// The time is by the reference clock. If one file has the frame as sent and others as received, the map has the sent
+/// one.
 type Aligned = HashMap<Vec<u8>, (f64, Direction)>;
 
 fn add(aligned: &mut Aligned, frames: &[Frame]) {
@@ -223,10 +226,10 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     })
 }
 
-/// Removes steps of a file's clock: more than [`STEP`] backward or [`APART`] forward.
+/// Removes steps (sudden changes) of a file's clock: more than [`STEP`] backward or [`APART`] forward.
 ///
-/// Times before a step are shifted as if the clock had been right from the start. Returns a description of the steps,
-/// if any.
+/// All times before a step are shifted by the step, so that the times after the last step stay the same. Returns a
+/// description of the steps, if any.
 fn without_steps(frames: &mut [Frame]) -> Option<String> {
     let times: Vec<f64> = frames.iter().map(|frame| frame.at).collect();
     let pairs = times.iter().zip(times.iter().skip(1));
@@ -284,9 +287,9 @@ fn is_copy(one: &Recording, other: &Recording) -> bool {
         .all(|(a, b)| (a.at, a.direction, &a.wire) == (b.at, b.direction, &b.wire))
 }
 
-/// Checks by its clock that a file without common frames belongs to the same flight.
+/// Checks that a file without common frames is from the same flight: its times are close to `span`.
 ///
-/// `span` has the first and the last time of the other files, s.
+/// `span` has the first and the last time of the other files, s. The times of the file are those of its own clock.
 fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     let times = file.frames.iter().map(|frame| frame.at);
     let [first, last] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {
@@ -317,7 +320,9 @@ fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
         .unwrap_or(to)
 }
 
-/// Converts the times of a file to the reference clock. Returns the relation of the clocks.
+/// Converts the times of a file to the reference clock. Returns the offsets that were added.
+///
+/// `aligned` has the frames of the files that have been converted before; `common` is the number of frames in common.
 fn align(file: &mut Recording, aligned: &Aligned, common: Option<usize>) -> Alignment {
     let own = once(&file.frames);
     let mut windows: Vec<(usize, Vec<Window>)> = Vec::new();

@@ -13,13 +13,15 @@ use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
 
 use crate::recording::Frame;
 
-/// Time between two computed snapshots, s. The time is fixed, because alarms are raised after a few seconds.
+/// Time between two computed snapshots, s.
+///
+/// It does not depend on the flight's duration, because an alarm begins after a few seconds.
 const PERIOD: f64 = 0.5;
 
 /// Maximum number of stored snapshots, not counting the last. In a long flight only every k-th snapshot is stored.
 const MOST: f64 = 7_200.0;
 
-/// Maximum time between two reported positions of a relay for an interpolation, s.
+/// Maximum time between two reported positions of a relay between which a position is interpolated, s.
 const GAP: f64 = 5.0;
 
 /// Mission that the chain loaded before flight, from the scenario.
@@ -70,7 +72,7 @@ pub struct Nearest {
     pub time_s: f64,
 }
 
-/// Recorded flight. All other times are in s since its first frame.
+/// Recorded flight. All times except `begin` are in s since the flight's first frame.
 #[derive(Debug, Default)]
 pub struct Flight {
     /// Time of the flight's first frame, s since 1970-01-01.
@@ -79,7 +81,7 @@ pub struct Flight {
     pub duration: f64,
     /// Time between two stored snapshots, s. The last snapshot is taken at the end of the flight.
     pub period: f64,
-    /// Stored snapshots as JSON, each one as its changes.
+    /// Stored snapshots as JSON. Each one has only the changes since the previous stored snapshot.
     pub steps: Vec<Value>,
     /// Last snapshot of the flight.
     pub last: Snapshot,
@@ -91,8 +93,8 @@ pub struct Flight {
     pub relays: u16,
     /// Time of the first agreement, s, and two fractions of the time since then.
     ///
-    /// First the fraction in which all relays have agreed positions, then the fraction in which all members of the last
-    /// view have.
+    /// In the first fraction of the time, all relays have agreed positions. In the second fraction, all members of the
+    /// view (membership of the chain) in force have agreed positions.
     pub available: Option<(f64, [f64; 2])>,
     /// Lowest SIR of any hop since the previous stored snapshot, dB; `None` if unknown.
     pub worst_db: Vec<Option<f64>>,
@@ -110,7 +112,9 @@ pub fn largest(frames: &[Frame]) -> u16 {
     entries.map(|(entry, ..)| entry.relay()).max().unwrap_or(0)
 }
 
-/// Returns the entries (states of relays) of a report message; the first entry has the detail, if any.
+/// Returns the relay states in a report message; no states for other messages.
+///
+/// The first state of the report comes with the report's detail, if any.
 fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
     let report = match &frame.message {
         Some(Message::Report(report)) => Some(report),
@@ -215,7 +219,9 @@ impl Flight {
     }
 }
 
-/// Returns the states of all relays in order of time. The time is that of the frame minus the entry's age.
+/// Returns the reported states of all relays in order of time.
+///
+/// The time of a state is the time of its frame minus the age that the frame states for it.
 fn reports(frames: &[Frame], begin: f64, relays: u16) -> Vec<Report> {
     let mut all: Vec<_> = frames
         .iter()
@@ -251,7 +257,7 @@ struct Recorder<'a> {
     loaded: Option<&'a Loaded>,
     view: StationView,
     uploads: BTreeMap<u16, Upload>,
-    /// End of the chain with the ground station that sent the last Watch (request for reports).
+    /// End of the chain where the ground station is that last sent a Watch (request for reports).
     end: Side,
     /// Number of processed reports, and of processed frames.
     used: [usize; 2],
@@ -266,8 +272,8 @@ struct Recorder<'a> {
     silent_at: Instant,
     /// Time of the first agreement, s, and numbers of snapshots since then.
     ///
-    /// The numbers are: all snapshots; snapshots in which all relays have agreed positions; snapshots in which all
-    /// members of the view have.
+    /// The numbers count all snapshots; those in which all relays have agreed positions; and those in which all members
+    /// of the view (membership of the chain) have agreed positions.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 
@@ -351,7 +357,7 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Repeats and logs the operator's commands that a frame's comment names.
+    /// Applies and logs the operator's commands that the comment of a frame contains.
     fn act(&mut self, flight: &mut Flight, now: f64, frame: &Frame) {
         let acts = frame.comment.split("; ");
         for act in acts.filter_map(|it| it.strip_prefix("operator: ")) {
@@ -456,9 +462,9 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Updates the closest approach by the distances between all relays.
+    /// Updates the closest approach of the flight by the distances between relays at `time_s`.
     ///
-    /// If `only` is given, only the distances of that relay are computed.
+    /// If `only` is given, only the distances from relay `only` to the other relays are computed.
     fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places
@@ -506,7 +512,7 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Removes the part about received frames from an alarm.
+/// Replaces or removes the text about the station's received frames in the text of an alarm.
 ///
 /// A replay has no data about the frames that the station received.
 fn replayed(text: String) -> String {
@@ -520,9 +526,9 @@ fn replayed(text: String) -> String {
     }
 }
 
-/// Returns the position of a relay at `now`, interpolated between two reports.
+/// Returns the position of a relay at `now`, interpolated between the reports before and after `now`.
 ///
-/// `None` if the time between the two exceeds [`GAP`].
+/// `None` if there is no such pair of reports, or if the time between the two reports exceeds [`GAP`].
 fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     let after = track.partition_point(|(at, _)| *at < now);
     let (t0, one) = track.get(after.checked_sub(1)?)?;

@@ -21,13 +21,13 @@ use uav_relay_scenario::mission::{mission, with_access};
 use flight::{Flight, Loaded};
 use recording::Recording;
 
-/// Relative tolerance of the SIR in missions, as in the Linux programs and the simulator.
+/// Relative tolerance of the SIR in missions. It is the same in the Linux programs and the simulator.
 const TOLERANCE: f64 = 1e-4;
 
 /// Replay of a flight: its page, and warnings.
 #[derive(Debug)]
 pub struct Replay {
-    /// Flight on the page.
+    /// Flight that the page shows.
     pub flight: Flight,
     /// Page as HTML.
     pub html: String,
@@ -90,9 +90,9 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
     })
 }
 
-/// Returns the scenario's mission with the digest `digest`, with equal or fitted slots, if it matches.
+/// Returns the scenario's mission with equal or fitted time slots, whichever has the digest `digest`.
 ///
-/// If `digest` is `None`, the mission has equal slots.
+/// `None` if neither has this digest. If `digest` is `None`, the mission has equal time slots.
 fn loaded(scenario: &Scenario, relays: u16, digest: Option<u16>) -> Result<Option<Loaded>, String> {
     let (plain, profiles) =
         mission(scenario, relays, TOLERANCE).map_err(|error| error.to_string())?;

@@ -14,7 +14,10 @@ use uav_relay_decode::source::{Item, Packet, SourceError, read};
 /// Intact frame of a capture.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time of the frame, s since 1970: by its own file's clock, but after a merge by the first file's.
+    /// Time of the frame, s since 1970.
+    ///
+    /// Before a merge of files the time is that of the clock of the frame's own file; after a merge, that of the first
+    /// file's clock.
     pub at: f64,
     /// Direction of the frame, seen from the node that wrote the file.
     pub direction: Direction,
@@ -24,7 +27,9 @@ pub struct Frame {
     pub header: Header,
     /// Message of the frame; `None` for a handshake, and for a message that no relay would accept.
     pub message: Option<Message>,
-    /// Comment on the frame and on omitted packets before it: the operator's commands. Empty for none.
+    /// Operator's commands in the capture's comments on this frame and on omitted packets before it.
+    ///
+    /// Empty without such comments.
     pub comment: String,
 }
 
@@ -36,10 +41,10 @@ fn join(comment: &mut String, more: &str) {
     comment.push_str(more);
 }
 
-/// Removes the frames that `is_kept` rejects. The comments of removed frames go to the next kept frame, or at the end
-/// to the last kept frame.
+/// Removes the frames that `is_kept` rejects.
 ///
-/// `last` is a comment on packets after the last frame.
+/// The comment of a removed frame is appended to the comment of the next kept frame, or of the last kept frame if no
+/// kept frame follows. `last` is the comment on packets after the last frame.
 pub(crate) fn retain(frames: &mut Vec<Frame>, last: &str, mut is_kept: impl FnMut(&Frame) -> bool) {
     let mut acts = String::new();
     frames.retain_mut(|frame| {
@@ -65,7 +70,7 @@ pub struct Recording {
     pub frames: Vec<Frame>,
     /// Network number of most frames.
     pub network: u16,
-    /// Digest of the mission loaded before flight, if a frame has it.
+    /// Digest of the mission loaded before flight, as most frames state it; `None` if no frame states it.
     pub mission: Option<u16>,
     /// Fault of the file after its last readable frame, if any.
     pub fault: Option<String>,
@@ -152,7 +157,9 @@ fn frame(packet: &Packet<'_>) -> Option<Frame> {
     })
 }
 
-/// Returns the digest of the mission that the sender loaded before flight, if the message has it.
+/// Returns the digest of the mission that the sender loaded before flight.
+///
+/// `None` if the message does not contain this digest.
 fn loaded(message: &Message) -> Option<u16> {
     match message {
         Message::Heartbeat { mission, .. }

@@ -141,7 +141,7 @@ fn a_relay_that_the_operator_cleared_is_gone_until_it_reports_again() {
     assert!((acts[2].time_s - 60.0).abs() < 1.0);
 }
 
-/// Checks that no operator's command is lost or moved far in time, even if its frame is repeated.
+/// Checks that no operator's command is lost or moved far in time, even if a capture repeats its frame.
 #[test]
 fn acts_of_the_operator_stay_at_their_time_and_are_all_kept() {
     let seconds = || (0..100).map(f64::from);

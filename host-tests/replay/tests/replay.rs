@@ -29,9 +29,9 @@ struct Flown {
     places: BTreeMap<u16, [f64; 2]>,
 }
 
-/// Simulates a chain over wires, or on a shared channel; relay 2 is switched off at `kill_s`.
+/// Simulates a chain with serial ports between neighbours or with a shared radio channel.
 ///
-/// The ground station at Tx requests reports.
+/// Relay 2 is switched off at `kill_s`. The ground station at Tx requests reports.
 fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown {
     let (mission, _) = mission(&Scenario::default(), relays, 1e-4).unwrap();
     let mut setup = if is_shared {
@@ -76,7 +76,7 @@ fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown
     }
 }
 
-/// Clock of a simulated node with an offset, s, a relative drift, and a step.
+/// Clock of a simulated node: it has an offset, s, a relative drift, and a sudden step.
 ///
 /// `step` has the step's time and size, s.
 #[derive(Clone, Copy, Default)]
@@ -98,8 +98,8 @@ impl Clock {
 
 /// Writes the frames that `node` has sent and received to a capture, with the times of `clock`.
 ///
-/// The node is switched off at `end_s`. From second 70 to 71.5 the node receives nothing, so that no frame connects the
-/// clocks just after a step.
+/// The node is switched off at `end_s`. From second 70 to 71.5 it receives nothing, so that just after a step of its
+/// clock no frame in two captures shows the new offset.
 fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) -> PathBuf {
     let path = folder.join(format!("node{node}.pcapng"));
     let mut capture = Capture::new(std::fs::File::create(&path).unwrap(), "a test", "").unwrap();
@@ -149,7 +149,9 @@ fn sender(wire: &[u8]) -> u16 {
 
 const EPOCH: f64 = 1.8e9;
 
-/// Checks that a command at a damaged packet moves to the next frame, or at the end to the last one.
+/// Checks that an operator's command in the comment on a damaged packet is kept.
+///
+/// The command must move to the next frame, or to the last frame if no frame follows.
 #[test]
 fn an_act_on_a_damaged_packet_is_kept() {
     let flown = fly(2, false, 10, None);

@@ -22,8 +22,8 @@ pub enum Area {
 
 /// Area of an interferer whose exact position and power are unknown.
 ///
-/// The interferer's entry in [`Interference`](crate::Interference) has its greatest power, and the middle of the area
-/// as its position.
+/// The same interferer is also an entry of [`Interference`](crate::Interference). That entry has the interferer's
+/// greatest power, and the middle of the area as position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceArea {
     /// Possible positions of the interferer. Neither Tx nor Rx is inside.
@@ -39,7 +39,7 @@ pub struct NoFly {
     pub key: String,
     /// Corners of the boundary, [x, y], m. A circle in the file is replaced by a polygon around it.
     pub corners: Vec<[f64; 2]>,
-    /// Lowest and highest altitude of the no-fly area, m, with the reference of `geometry.altitude_m`.
+    /// Lowest and highest altitude of the no-fly area, m, measured like the key `geometry.altitude_m`.
     pub altitudes_m: RangeInclusive<f64>,
 }
 
@@ -201,7 +201,8 @@ impl NoFly {
 
     /// Returns the intervals of x, m, in which a relay is inside the no-fly area or close to it.
     ///
-    /// The relay flies at `y_m` and `altitude_m`. Close means within `around_m`, m, in x, y and altitude.
+    /// The relay flies at `y_m` and `altitude_m`. It is close if its distance from the area is at most `around_m` in
+    /// each of x, y and altitude, m.
     pub fn intervals_m(&self, y_m: f64, altitude_m: f64, around_m: f64) -> Vec<[f64; 2]> {
         let around_m = around_m.max(1e-6);
         let [lowest, highest] = [self.altitudes_m.start(), self.altitudes_m.end()];
@@ -232,7 +233,7 @@ impl NoFly {
             .collect()
     }
 
-    /// Returns the horizontal length of a straight path inside the area, m.
+    /// Returns the horizontal length of the part of a straight path that is inside the no-fly area, m.
     ///
     /// The path has two ends, each [x, y, altitude].
     pub fn crossing_m(&self, [from, to]: [[f64; 3]; 2]) -> f64 {
@@ -270,7 +271,9 @@ fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> {
     corners.iter().zip(next).map(|(from, to)| [*from, *to])
 }
 
-/// Returns true if `at` is inside the polygon, so that a ray from it crosses an odd number of edges.
+/// Returns true if `at` is inside the polygon.
+///
+/// It is inside if a ray from it crosses an odd number of the polygon's edges.
 fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
     let crossed = edges(corners).filter(|[a, b]| {
         (a[1] > at[1]) != (b[1] > at[1])

@@ -263,9 +263,9 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Creates the error for a table that [`table`] accepts, but serde rejects.
+/// Creates the error for a scenario table that the function [`table`] accepts, but serde rejects.
 ///
-/// Such an error is a bug of this crate: the table of keys contradicts the Rust types.
+/// Such an error is a bug of this crate: the list of allowed keys contradicts the Rust types.
 pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),

@@ -12,7 +12,7 @@ use super::keys::SECTIONS;
 use crate::check;
 use crate::error::{Problem, ScenarioError};
 
-/// Default network number of all tools. Relays ignore frames with any other network number.
+/// Default network number of all programs. Relays ignore frames with any other network number.
 pub const NETWORK: u16 = 1;
 
 /// Relative tolerance of the target SIR on companion computers. No option changes it.
@@ -69,7 +69,9 @@ pub struct Companion {
     pub epoch_file: Option<PathBuf>,
     /// File that stores the newest mission that was uploaded to the relay.
     pub upload_file: Option<PathBuf>,
-    /// File that stores the relay's votes on the membership. The file prevents a second vote after a reboot.
+    /// File that stores the relay's votes on views (memberships of the chain).
+    ///
+    /// Because of this file, a relay that has voted before a reboot does not vote again after the reboot.
     pub view_file: Option<PathBuf>,
     /// Autopilot: a serial port, or a UDP address as parsed by [`Endpoint`](crate::endpoint::Endpoint).
     pub autopilot: Option<String>,
@@ -118,7 +120,7 @@ pub struct Ground {
     pub epoch_file: Option<PathBuf>,
     /// Time after which the ground station gives up an upload, s, 1 to 86400.
     pub timeout_s: Option<u32>,
-    /// True if the ground station continues to run after an upload; false if it exits then.
+    /// True if the ground station continues to run after an upload; false if it exits after the upload.
     pub stand: Option<bool>,
     /// Source of interference measurements: a FIFO, a file, or `udp:[HOST:]PORT`.
     pub measurements: Option<String>,

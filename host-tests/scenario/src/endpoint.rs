@@ -9,17 +9,21 @@ const PREFIX: &str = "udp:";
 
 /// UDP ports at which PX4's simulation listens for a companion computer: one for each vehicle 0 to 9.
 const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
-/// Local UDP port to which vehicle 0 of PX4's simulation sends. Vehicle n sends to the port with a number larger by n.
+/// Local UDP port to which vehicle 0 of PX4's simulation sends.
+///
+/// Vehicle n sends to port 14540 + n.
 const PX4_SENDS_TO: u16 = 14_540;
 
-/// Difference between the companion's default local port and the autopilot's port. The difference applies only to
-/// autopilot ports outside of [`PX4_LISTENS`]. For ports in that range the local ports start at [`PX4_SENDS_TO`].
+/// Difference by which the companion's default local port is larger than the autopilot's port.
+///
+/// It applies only to autopilot ports outside of [`PX4_LISTENS`]. For ports in that range the local ports start at
+/// [`PX4_SENDS_TO`].
 const APART: u16 = 1_000;
 
 /// Description of a valid UDP address and its ports, for error messages.
 pub const FORM: &str = "udp:HOST:PORT with PORT within 1 to 64535 (the local port is then up to PORT + 1000), or udp:HOST:PORT@LOCAL with PORT and the local port LOCAL within 1 to 65535";
 
-/// UDP address of an autopilot, with the companion's own UDP port for it.
+/// UDP address of an autopilot, and the local UDP port through which the companion talks to it.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Endpoint {
     /// Host of the autopilot: a name, an IPv4 address, or an IPv6 address in brackets.

@@ -63,9 +63,9 @@ struct RawNoFly {
     highest_m: Option<f64>,
 }
 
-/// Area in a scenario file: exactly one of these keys is given.
+/// Area in a scenario file: exactly one of the keys below is given.
 ///
-/// Values of keys that end in `_deg` are latitudes and longitudes, degrees. The other keys have x and y, m.
+/// Keys that end in `_deg` have latitudes and longitudes, degrees. The other keys have x and y, m.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawArea {
@@ -86,7 +86,7 @@ enum RawPowers {
 }
 
 impl RawPowers {
-    /// Returns the least power if `end` is 0, the greatest power if `end` is 1.
+    /// Returns the least power if the argument `end` is 0, and the greatest power if it is 1.
     fn end(self, end: usize) -> f64 {
         match self {
             Self::One(one) => one,
@@ -152,7 +152,7 @@ struct RawDataLink {
 }
 
 impl RawDataLink {
-    /// Returns true if `[link]` describes a data link. A `[link]` with only the key `reverse` does not.
+    /// Returns true if `[link]` describes a data link: it is empty, or has a key other than `reverse`.
     const fn has_radio(&self) -> bool {
         self.access.is_some()
             || self.bandwidth_hz.is_some()
@@ -218,7 +218,7 @@ pub(super) fn from_table(file: &str, table: &Table) -> Result<RawFile, ScenarioE
         .map_err(|error| internal_mismatch(file, &error))
 }
 
-/// Builds the scenario after checking that its keys agree with each other.
+/// Builds the scenario from a file's content. Returns an error if keys of the file contradict each other.
 pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError> {
     let geometry = raw.geometry;
     let altitude_m = geometry.altitude_m;
@@ -567,7 +567,9 @@ fn relays(
     Ok(relays)
 }
 
-/// Converts the `[plan]` table of a file. Returns an error unless the table has one position for each of its relays.
+/// Converts the `[plan]` table of a file.
+///
+/// Returns an error unless the number of positions in the table is its number of relays `uavs`.
 fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
     if raw.places.len() != usize::from(raw.uavs) {
         return Err(mistake(
@@ -603,10 +605,10 @@ struct RawSite {
     amsl_m: f64,
 }
 
-/// Returns the geographic line from Tx to Rx (`None` if the file has no `[site]`), and its length, m.
+/// Returns the geographic line from Tx to Rx, and the distance from Tx to Rx, m.
 ///
-/// With `[site]` the length is computed from the positions of Tx and Rx, and a different `distance_m` is an error.
-/// Without `[site]` the length is `distance_m`.
+/// With `[site]`, the distance is computed from the geographic positions of Tx and Rx, and a different `distance_m` is
+/// an error. Without `[site]` the line is `None`, and the distance is `distance_m`.
 pub(super) fn line(
     file: &str,
     sites: Option<RawSites>,
@@ -710,9 +712,9 @@ pub(super) struct Powers {
 
 /// Power of a sender in a scenario file: in W, in dBm, or as an EIRP.
 ///
-/// Each value comes with the name of its key.
+/// Each field is a pair: the name of the power's key in the file, and the power if the file has this key.
 pub(super) struct GivenPower<'a> {
-    /// Prefix of the keys' names in error messages: the table with a dot, such as `interferer[0].`
+    /// Prefix of a key's name in error messages, such as `interferer[0].`: the table's name and a dot.
     pub(super) table: &'a str,
     pub(super) in_w: (&'a str, Option<f64>),
     pub(super) in_dbm: (&'a str, Option<f64>),
@@ -793,10 +795,10 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
     })
 }
 
-/// Largest accepted error of the interference, dB, if an interferer's height is ignored.
+/// Largest accepted error of the interference power, dB, from ignoring an interferer's height.
 ///
-/// An interferer whose ignored height causes a larger error is rejected. The error is checked at all positions that
-/// relays or Rx may have.
+/// An interferer whose height causes a larger error is rejected. The error is checked at all positions that relays or
+/// Rx may have.
 const MAX_HEIGHT_ERROR_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -823,7 +825,7 @@ pub(super) struct RelayArea<'a> {
 }
 
 impl RawSource {
-    /// Returns the least EIRP if `end` is 0, the greatest EIRP if `end` is 1; in W.
+    /// Returns the EIRP, W: the least EIRP if the argument `end` is 0, the greatest EIRP if it is 1.
     fn eirp_w(&self, file: &str, table: &str, end: usize) -> Result<f64, ScenarioError> {
         let of = |powers: Option<RawPowers>| powers.map(|powers| powers.end(end));
         let said = GivenPower {
@@ -837,8 +839,9 @@ impl RawSource {
     }
 }
 
-/// Converts the areas of the `[[interferer]]` tables, each with the index of its table. An area with Tx or Rx inside is
-/// an error.
+/// Converts the areas of the `[[interferer]]` tables.
+///
+/// The keys of the result are the indices of the tables. An area with Tx or Rx inside is an error.
 fn source_areas(
     file: &str,
     raw: &[RawSource],
@@ -977,7 +980,7 @@ fn near_line(
     })
 }
 
-/// Returns the allowed positions, for the error message about a position that is too far away.
+/// Describes the allowed positions, for the error message about a position that is too far away.
 fn far_from(line: &Line, [lat, lon]: [f64; 2]) -> String {
     let at = |lat, lon| Geodetic::from_degrees(lat, lon, 0.0);
     let away_m = at(lat, lon).and_then(|point| line.axis.away_m(point));
@@ -1242,10 +1245,10 @@ fn on_earth(
 }
 
 impl RelayArea<'_> {
-    /// Returns the largest error of the interference, dB, if the interferer's height is ignored.
+    /// Returns the largest error of the interference power, dB, from ignoring the interferer's height.
     ///
-    /// The interferer is at (`x_m`, `y_m`) and `above_m` over the ground, m. The error is checked at Rx, and at 65
-    /// altitudes above the relay position nearest to the interferer, where it is largest.
+    /// The interferer is at (`x_m`, `y_m`), `above_m` over the ground, m. The error is largest at Rx or above the relay
+    /// position nearest to the interferer. It is computed at Rx, and at 65 altitudes at that relay position.
     fn height_error_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;
         let ratio_db = |beside_m: f64, h: f64| {

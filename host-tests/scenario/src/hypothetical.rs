@@ -13,10 +13,12 @@
 use super::Source;
 use super::scene::{Place, Scene};
 
-/// Approximate number of quadrature points for the first searches, which evaluate many positions.
+/// Approximate number of quadrature points for the grid search and the first local searches.
 const COARSE: usize = 400;
 
-/// Approximate number of quadrature points for the last searches.
+/// Approximate number of quadrature points for the last local searches.
+///
+/// They start at the best results of the first local searches.
 const FINE: usize = 4_000;
 
 /// Number of steps from Tx to Rx in the grid of relay positions of [`Hypothetical::sided`].
@@ -29,23 +31,26 @@ const REPORTED: usize = 60_000;
 
 /// Largest lateral distance y_H in the search, as a multiple of the scene's size.
 ///
-/// At this distance the interference is the same at all relay positions, within a thousandth. The size of the scene is
-/// its largest extent in x, y or altitude.
+/// An interferer at this distance causes nearly the same interference at all relay positions: the difference is at most
+/// a thousandth. The size of the scene is its largest extent in x, y or altitude.
 const FAR: f64 = 30.0;
 
-/// Grid step of the search in u = asinh(y_H / lowest altitude).
+/// Step of the search grid in the coordinate u = asinh(y_H / lowest relay altitude).
 ///
-/// y_H is the lateral distance of the interferer. Far from the line Tx-Rx each step multiplies y_H by about 1.4.
+/// y_H is the lateral distance of the hypothetical interferer. Far from the line Tx-Rx each step multiplies y_H by
+/// about 1.4.
 const RISE: f64 = 0.35;
 
-/// Largest number of local searches that start at minima of the grid.
+/// Largest number of local searches that start at local minima of the error on a grid.
 ///
-/// The same number of further searches starts at true interferers.
+/// It is also the largest number of further searches that start at the positions of true interferers.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
 
-/// A hypothetical interferer that replaces all interferers of a scene, and its interference error.
+/// A hypothetical interferer that replaces all interferers of a scene, and the error that this causes.
+///
+/// The error is the difference between its interference power and that of the true interferers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothetical {
     /// Transmit power of the hypothetical interferer (p_H), W, > 0.
@@ -56,19 +61,19 @@ pub struct Hypothetical {
     pub y_m: f64,
     /// Mean absolute error of the interference power at the possible relay positions, W.
     ///
-    /// These positions are in the vertical plane from Tx to Rx.
+    /// The possible positions are in the vertical plane from Tx to Rx, between the lowest and the highest altitude.
     pub mean_abs_error_w: f64,
     /// Integral of the absolute error, divided by the integral of the true interference.
     ///
-    /// Both integrals are over the possible relay positions. 0 is a perfect fit.
+    /// 0 is a perfect fit. Both integrals are over the possible relay positions in the vertical plane from Tx to Rx.
     pub relative_error: f64,
 }
 
 impl Hypothetical {
-    /// Returns this interferer or its mirror image at the line Tx-Rx, whichever has the smaller error.
+    /// Returns this interferer or its mirror image across the line Tx-Rx, whichever has the smaller error.
     ///
     /// The error is the sum of |ln(I_H / I)| over relay positions with lateral offsets from `least_m` to `most_m`, m.
-    /// I_H is the interference from the hypothetical interferer, I that from the true interferers.
+    /// I_H is the interference power of the hypothetical interferer, I that of the true interferers.
     #[must_use]
     pub fn sided(self, scene: &Scene, least_m: f64, most_m: f64) -> Self {
         let other = Self {
@@ -119,15 +124,15 @@ pub struct Fit {
     pub x_m: f64,
     /// Distance y_H of the hypothetical interferer from the line Tx-Rx, m, >= 0.
     pub y_m: f64,
-    /// Best power of an interferer at (`x_m`, `y_m`), and the error that remains.
+    /// Power with the least error for an interferer at (`x_m`, `y_m`), and this least error.
     pub best_power: BestPower,
 }
 
-/// Returns the single interferer that best replaces all in `scene`; `None` if `scene` has none.
+/// Returns the interferer whose interference is closest to that of all interferers in `scene`.
 ///
-/// The search usually evaluates about 1 500 positions with 400 quadrature points each, 600 positions with 4 000, and
-/// one with 60 000. The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in
-/// `host-tests/tests/multi_interferer`).
+/// `None` if `scene` has no interferers. The search usually evaluates about 1 500 positions with 400 quadrature points
+/// each, about 600 positions with 4 000 points each, and one position with 60 000 points. The errors have a relative
+/// accuracy of 3e-5 (test `the_rasters_are_fine_enough` in `host-tests/tests/multi_interferer`).
 pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     let found = fit(scene, &Raster::graded(scene, None, FINE))?;
     let place = (found.x_m, found.y_m);
@@ -174,7 +179,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
 
 /// Returns the points (x, u) of the search space at which the local searches start.
 ///
-/// The points are the deepest local minima of a grid, and the true interferers with the smallest errors.
+/// They are the local minima of a grid with the smallest errors, and the true interferers with the smallest errors.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -288,8 +293,8 @@ impl Space {
 
     /// Minimises the error by the simplex method from `start`, a point (x, u) of the search space.
     ///
-    /// `share` is the size of the first simplex, as a fraction of the length over which the error changes noticeably.
-    /// The search ends when the errors at the corners agree to the relative `tolerance`, or after `most` steps.
+    /// `share` is the size of the first simplex, relative to the distance over which the error changes noticeably. The
+    /// search ends if the errors at the corners differ by less than the relative `tolerance`, or after `most` steps.
     fn descend(
         &self,
         raster: &Raster,
@@ -324,7 +329,9 @@ struct Node {
     x: f64,
     h_squared: f64,
     weight: f64,
-    /// Sum of p / distance^2 at this quadrature point over the true interferers, each of power p, W/m^2.
+    /// Sum of p / distance^2 over the true interferers, W/m^2.
+    ///
+    /// p is the power of an interferer, and distance is its distance from this quadrature point.
     truth: f64,
 }
 
@@ -338,15 +345,15 @@ pub struct Raster {
     total: f64,
 }
 
-/// Best power of a hypothetical interferer at a given position, and the error that remains.
+/// Power with the least error for a hypothetical interferer at a given position, and this least error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BestPower {
-    /// Best transmit power of the hypothetical interferer at its position, W, > 0.
+    /// Transmit power with the least error for the hypothetical interferer at its position, W, > 0.
     pub power_w: f64,
-    /// Error that remains: the integral of |p / d^2 - S| over the quadrature points.
+    /// Least error: the integral of |p / d^2 - S| over the quadrature points.
     ///
-    /// p is this interferer's power, d its distance, and S the sum of p / d^2 over the true interferers. The unit is
-    /// W for an integral over distance and altitude, and W/m for an integral over distance only.
+    /// p is this interferer's power, d its distance, and S the sum of p / d^2 over the true interferers. The unit is W
+    /// for an integral over distance and altitude, and W/m for an integral over distance only.
     pub error: f64,
 }
 
@@ -373,10 +380,10 @@ impl Raster {
         Self::of(scene, &rows, |_| midpoints(0.0, scene.distance_m, columns))
     }
 
-    /// Creates quadrature points in cells that are smaller near the interferers and the position `also`.
+    /// Creates quadrature points in cells that are smaller near the interferers and near `also`.
     ///
-    /// `also` is (x, y) in m. Each cell has two Gauss points per direction. The number of points is at most about
-    /// `most`, > 100, unless the number of interferers alone requires more.
+    /// `also` is a further position (x, y), m. Each cell has two Gauss points per direction. The number of points is at
+    /// most about `most`, > 100, unless the number of interferers alone requires more.
     pub fn graded(scene: &Scene, also: Option<(f64, f64)>, most: usize) -> Self {
         let sharp: Vec<(f64, f64)> = scene
             .sources
@@ -460,7 +467,9 @@ impl Raster {
         self.nodes.is_empty()
     }
 
-    /// Returns the area that the quadrature points cover, m^2; their length, m, if all are on a line.
+    /// Returns the area that the quadrature points cover, m^2.
+    ///
+    /// If all points are on a line, returns the length of the line instead, m.
     pub fn area(&self) -> f64 {
         self.area
     }
@@ -472,11 +481,11 @@ impl Raster {
         self.total
     }
 
-    /// Returns the best power of a hypothetical interferer at (`x`, `y`), m, and the error that remains.
+    /// Returns the power with the least error for an interferer at (`x`, `y`), m, and this error.
     ///
-    /// The error is the integral of |p g - S|. p is the interferer's power, and g = 1 / distance^2 its effect per
-    /// watt. S is the sum of p g over the true interferers. The best p is the median of S / g, weighted by g. The
-    /// time is linear in the number of points.
+    /// The error is the integral of |p g - S|. p is the interferer's power, and g = 1 / distance^2 its effect per watt.
+    /// S is the sum of p g over the true interferers. The best p is the median of S / g, weighted by g. The time is
+    /// linear in the number of points.
     pub fn best_power(&self, x: f64, y: f64) -> BestPower {
         let shape = |node: &Node| {
             let dx = node.x - x;
@@ -518,9 +527,9 @@ fn gauss(ends: &[f64]) -> Vec<WeightedCoordinate> {
         .collect()
 }
 
-/// Value and weight of one quadrature point for the weighted median.
+/// Term of the weighted median: the value and the weight of one quadrature point.
 ///
-/// The value is the power of a single interferer, W, that gives the right interference at this point.
+/// The value is the power, W, with which a single interferer gives the true interference at this point.
 struct Ratio {
     value: f64,
     weight: f64,
@@ -548,7 +557,9 @@ fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     median
 }
 
-/// Coordinate at which a sampled function changes fastest. A grid has its smallest cells at this point.
+/// Coordinate at which a function of one coordinate changes fastest.
+///
+/// A grid for this function has its smallest cells there.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
     /// Coordinate of the fastest change, m: an x or an altitude.
@@ -566,10 +577,9 @@ impl Centre {
 
 /// Returns the ends of a grid's cells from `low` to `high`, ascending. Cells are smaller near `centres`.
 ///
-/// A cell is at most 1.5 times as wide as the smaller of two lengths. One is `widest`. The other is `step` (below 1)
-/// times the length over which the function changes at the cell.
-///
-/// The number of ends is about (high - low) / widest, and 2 ln(2 (high - low) / width) / step more for each centre.
+/// A cell is at most 1.5 times as wide as the smaller of two lengths: `widest`, and `step` (below 1) times the length
+/// over which the function changes there. There are about (high - low) / widest ends without `centres`, and each centre
+/// adds about 2 ln(2 (high - low) / width) / step ends.
 pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -> Vec<f64> {
     let mut ends = vec![low];
     let mut at = low;
@@ -597,8 +607,8 @@ struct Corner {
 
 /// Minimises `f` by the simplex method. Returns the best point found, never worse than `start`.
 ///
-/// `steps` is the size of the first simplex. The search ends when the values at the corners agree to the relative
-/// `tolerance`, or after `most` steps. A step takes at most four evaluations of `f`.
+/// `steps` is the size of the first simplex. The search ends when the values at the simplex corners differ by less than
+/// the relative `tolerance`, or after `most` steps. A step takes at most four evaluations of `f`.
 fn minimise(
     f: impl Fn((f64, f64)) -> f64,
     start: (f64, f64),
@@ -647,9 +657,9 @@ fn minimise(
     best
 }
 
-/// Returns the point at the fraction `share` of the way from `from` to `to`.
+/// Returns a point on the line through `from` and `to`: `from` for a `share` of 0, `to` for 1.
 ///
-/// With `share` above 1 the point is beyond `to`.
+/// With `share` above 1 the point is beyond `to`, as seen from `from`.
 fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
     (
         from.0 + share * (to.0 - from.0),

@@ -7,16 +7,16 @@ use std::path::Path;
 /// Reads the secret key in `file`. `option` is the command-line option that named the file, for error messages.
 ///
 /// # Errors
-/// A text with the option, the file and the problem, such as a file that other users can read; never the file's
-/// content.
+/// A text with the option, the file and the problem, for example that other users can read the file. The text never
+/// contains the content of the file.
 pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     parse(&read(option, file)?).map_err(|error| format!("{option} {}: {error}", file.display()))
 }
 
-/// Reads a password from the first line of `file`. `option` is the command-line option that named the file.
+/// Reads a password from the first line of `file`; `option` is the command-line option that named it.
 ///
 /// # Errors
-/// A text with the option, the file and the problem, as for a key; never the file's content.
+/// A text with the option, the file and the problem. The text never contains the content of the file.
 pub fn load_password(option: &str, file: &Path) -> Result<String, String> {
     let text = read(option, file)?;
     let password = text.lines().next().unwrap_or_default().trim();
@@ -37,7 +37,7 @@ fn read(option: &str, file: &Path) -> Result<String, String> {
 
 /// Rejects a key file that users other than its owner and group can read or write.
 ///
-/// A missing or unreadable file is accepted here, because a later read of it fails.
+/// Accepts a missing or unreadable file, because the caller's attempt to read such a file fails anyway.
 #[cfg(unix)]
 fn check_mode(file: &Path) -> Result<(), String> {
     use std::os::unix::fs::PermissionsExt as _;

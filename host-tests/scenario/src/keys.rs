@@ -11,7 +11,9 @@ use super::endpoint::FORM;
 use super::link::Access;
 use super::spec::PlannedMethod;
 
-/// Range of a number in a scenario file. Both ends belong to the range, except the low end if `open` is true.
+/// Range of a number in a scenario file: `low` to `high`.
+///
+/// Both ends belong to the range, except that `low` does not if `open` is true.
 pub(super) struct Range {
     low: f64,
     high: f64,
@@ -22,14 +24,16 @@ pub(super) struct Range {
 pub(super) enum Rule {
     Number(Range),
     Whole(Range),
-    /// Text "los" (line of sight) or "nlos" (obstructed), or a number within this range.
+    /// Text "los" (line of sight) or "nlos" (obstructed), or a number within the given range.
     LinkOrNumber(Range),
     Flag,
     /// A number within this range, or a list of two numbers: the least and the greatest.
     NumberOrTwo(Range),
     /// List with one number for each of these ranges.
     Numbers(&'static [Range]),
-    /// List of points, each with one number for each range. The pair limits the number of points: least and greatest.
+    /// List of points, each with one number for each range.
+    ///
+    /// The pair has the least and the greatest number of points.
     Points(&'static [Range], [usize; 2]),
     Choice(&'static [&'static str]),
     Text,
@@ -46,7 +50,7 @@ pub(super) enum Rule {
 pub(super) enum Need {
     Always,
     Never,
-    /// The key is required if the table has none of these other keys.
+    /// The key is required if its table has none of the keys with these names.
     Unless(&'static [&'static str]),
 }
 
@@ -338,7 +342,7 @@ impl Key {
         }
     }
 
-    /// Returns those of `keys` that the table may have in place of this required key.
+    /// Returns the keys among `keys` that a table may have in place of this required key.
     pub(super) fn alternatives(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,

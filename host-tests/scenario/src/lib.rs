@@ -46,7 +46,7 @@ impl Scenario {
     /// Reads a scenario file of at most 1 MiB.
     ///
     /// # Errors
-    /// A file that cannot be read as text, or any of the mistakes of [`Scenario::parse`].
+    /// If the file cannot be read as text, or has a mistake that [`Scenario::parse`] rejects.
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
         let text = check::text_of(path)?;
         Self::parse(&path.display().to_string(), &text)
@@ -72,7 +72,8 @@ impl deployment::Deployment {
     /// Reads a scenario file: the scenario, and the settings in `[network]`, `[companion]` and `[ground]`.
     ///
     /// # Errors
-    /// Those of [`Scenario::load`], and a number of relays in `[network]` that differs from `[plan]`.
+    /// If [`Scenario::load`] rejects the file, if one of the three sections has a mistake, or if the numbers of relays
+    /// in `[network]` and `[plan]` differ.
     pub fn load(path: &Path) -> Result<(Scenario, Self), ScenarioError> {
         let (name, text) = (path.display().to_string(), check::text_of(path)?);
         let scenario = Scenario::parse(&name, &text)?;
@@ -84,11 +85,11 @@ impl deployment::Deployment {
 
     /// Parses only the settings in `[network]`, `[companion]` and `[ground]` of a scenario file.
     ///
-    /// Unlike [`Self::load`], it accepts a number of relays that differs from the plan. `file_name` is used only in
-    /// error messages.
+    /// Unlike [`Self::load`], it accepts a number of relays in `[network]` that differs from the number in `[plan]`.
+    /// `file_name` is used only in error messages.
     ///
     /// # Errors
-    /// Invalid TOML, and any mistake in a section.
+    /// If the text is not valid TOML, or if a section has a mistake.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, ScenarioError> {
         let table = check::table_of(file_name, text)?;
         check::table(file_name, &table)?;

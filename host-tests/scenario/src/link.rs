@@ -34,9 +34,11 @@ pub enum Access {
     /// A single frequency for all hops. Each of the N + 1 hops has one of N + 1 equal time slots.
     #[default]
     Slots,
-    /// A frequency for each hop. All hops send at the same time.
+    /// A frequency of its own for each hop. All hops send at the same time.
     Channels,
-    /// A single frequency for all hops. The time slots are as long as each hop needs for the same amount of data.
+    /// A single frequency for all hops, with time slots of different lengths.
+    ///
+    /// A hop's time slot is as long as the hop needs to carry the same amount of data as every other hop.
     Fitted,
 }
 
@@ -53,9 +55,9 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots in which each hop sends once, in each direction if `both_ways`.
+    /// Returns the number of time slots in which every hop sends once, or once each way if `both_ways`.
     ///
-    /// With a frequency for each hop it is 1 per direction, because all hops send at once.
+    /// If each hop has its own frequency, one slot per direction suffices, because all hops send at once.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
@@ -128,9 +130,10 @@ impl RateModel {
     }
 }
 
-/// Returns the data rate of the worse direction, bit/s, to compare plans.
+/// Returns the data rate by which plans are compared, bit/s: that of the worse direction.
 ///
-/// It is the smaller of `there_bps` and `back_bps` / `reverse`. If `reverse` is 0, it is `there_bps`.
+/// It is the smaller one of `there_bps`, the rate to Rx, and `back_bps` / `reverse`, the scaled rate to Tx. If
+/// `reverse` is 0, it is `there_bps`.
 pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
     if reverse > 0.0 {
         there_bps.min(back_bps / reverse)
@@ -144,7 +147,9 @@ pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
 pub struct Link {
     /// Medium access: how the hops share frequencies and time.
     pub access: Access,
-    /// Bandwidth of one frequency, Hz, 1 to 1e12; `None` to use the scenario's noise bandwidth.
+    /// Bandwidth of each frequency that the hops use, Hz, 1 to 1e12.
+    ///
+    /// `None` to use the scenario's noise bandwidth.
     pub bandwidth_hz: Option<f64>,
     /// Spectral efficiency of a hop as a function of its SINR.
     pub model: RateModel,
@@ -190,12 +195,12 @@ impl fmt::Display for BandwidthError {
 impl std::error::Error for BandwidthError {}
 
 impl Radio {
-    /// Creates the data link of `scenario`. Without `[link]` in the file, the defaults of its keys apply.
+    /// Creates the data link of `scenario`; without `[link]` in the file, the defaults of `[link]` apply.
     ///
     /// `option_hz` is the bandwidth in a command's option; `None` uses the bandwidth in the scenario.
     ///
     /// # Errors
-    /// [`BandwidthError`] if there is no bandwidth, or if the two bandwidths differ.
+    /// [`BandwidthError`] if neither gives a bandwidth, or if both give bandwidths that differ.
     pub fn new(scenario: &Scenario, option_hz: Option<f64>) -> Result<Self, BandwidthError> {
         let link = scenario.link.clone().unwrap_or_default();
         if let (Some(option_hz), Some(file_hz)) = (option_hz, link.bandwidth_hz)
@@ -210,7 +215,9 @@ impl Radio {
         })
     }
 
-    /// Returns the data rate of a hop while it sends, bit/s, from its linear SIR. The interference is treated as noise.
+    /// Returns the data rate of a hop in its own time slot, bit/s, from its linear SIR.
+    ///
+    /// The interference is treated as noise.
     pub fn hop_bps(&self, sir: f64) -> f64 {
         self.bandwidth_hz * self.link.model.bits_per_hz(sir)
     }
@@ -232,8 +239,8 @@ impl Radio {
     /// Returns the data rates to Rx and back to Tx, bit/s, of a chain that sends in both directions.
     ///
     /// `there` and `back` are the linear SIRs of the hops toward Rx and toward Tx. `reverse` is the planned rate to Tx
-    /// divided by the rate to Rx. With fitted slots and `reverse` above 0, the returned rates have this ratio.
-    /// Otherwise each direction has half of the time.
+    /// divided by the planned rate to Rx. With fitted slots and `reverse` above 0, the returned rates have this ratio.
+    /// Otherwise each direction gets half of the time.
     pub fn both_bps(&self, there: &[f64], back: &[f64], reverse: f64) -> [f64; 2] {
         if reverse > 0.0 && self.link.access == Access::Fitted {
             let time = |sirs| match self.chain_bps(sirs) {

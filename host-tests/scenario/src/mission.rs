@@ -75,10 +75,10 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// Converts a scenario to a mission of `uavs` relays, and the profiles of relays with own values.
+/// Converts a scenario to a mission of `uavs` relays, and the profiles from its `[[relay]]` tables.
 ///
-/// Such a relay has an altitude or a power of its own. The index of a relay is counted from 1. Several interferers are
-/// replaced by one hypothetical interferer.
+/// A profile is the altitude and the power of one relay; it comes with the relay's index, from 1. Several interferers
+/// are replaced by one hypothetical interferer.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -160,7 +160,7 @@ pub fn mission(
     Ok((mission, profiles))
 }
 
-/// Returns `mission` with the fitted slots of the scenario, if it has any.
+/// Returns `mission` with fitted time slots if the scenario has them; otherwise with equal time slots.
 ///
 /// Relays use fitted slots only with the method `joint`; with other methods all slots are equal.
 ///
@@ -185,9 +185,9 @@ pub fn with_access(scenario: &Scenario, mission: &Mission) -> Result<Mission, Re
     Mission::try_new(config).map_err(Refusal::Mission)
 }
 
-/// Returns the single interferer that best replaces the scenario's interferers.
+/// Returns the interferer whose interference is closest to that of all the scenario's interferers.
 ///
-/// `None` if there are fewer than two interferers, or if the search finds none.
+/// `None` if the scenario has fewer than two interferers, or if the search finds none.
 pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     match &scenario.interference {
         Interference::Sources(sources) if sources.len() > 1 => {
@@ -219,7 +219,8 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
 
 /// Returns `mission` with the same interference at every x, for the time before any measurement.
 ///
-/// At every x the mean of 1 / I is that at Rx, for the interference I. A mission without a random field is unchanged.
+/// At every x, the mean of 1 / I gets its value at Rx; I is the interference power. A mission without a random field is
+/// unchanged.
 #[must_use]
 pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();
@@ -243,9 +244,10 @@ pub fn with_uniform_field(mission: &Mission) -> Mission {
         .unwrap_or(*mission)
 }
 
-/// Returns alpha and beta of the Beta distribution of I / `i_max_w` at `x_m`; I is the interference.
+/// Returns alpha and beta of the Beta distribution of I / `i_max_w` at `x_m`.
 ///
-/// Between two points of the field, alpha and the mean of `i_max_w` / I are interpolated. From the two follows beta.
+/// I is the interference power. Between two points of the field, alpha and the mean of `i_max_w` / I are interpolated.
+/// beta is computed from these two values.
 pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);

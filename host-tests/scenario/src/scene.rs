@@ -11,7 +11,9 @@ use crate::{Interference, Scenario, Source};
 /// Relay of a chain in a [`Scene`]: its altitude and its transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
-    /// Altitude of the relay, m, > 0. The joint methods may change it unless `holds` is true.
+    /// Altitude of the relay, m, > 0.
+    ///
+    /// Planning methods that choose altitudes may change it unless `holds` is true.
     pub altitude_m: f64,
     /// Transmit power (EIRP) of the relay, W, > 0.
     pub power_w: f64,
@@ -69,7 +71,7 @@ pub struct Scene {
     pub areas: BTreeMap<usize, Area>,
     /// Least and greatest altitude of each interferer, m, by index in `sources`; 0 if it is not in the map.
     ///
-    /// For each receiver the interferer is at that altitude within these limits which is nearest to the receiver's
+    /// For each receiver, the interferer's altitude is the one within these limits that is nearest to the receiver's
     /// altitude.
     pub heights_m: BTreeMap<usize, [f64; 2]>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
@@ -114,8 +116,8 @@ impl From<Placement> for Place {
 impl Scene {
     /// Creates the scene of a chain of `relays` relays in `scenario`.
     ///
-    /// `None` if the interference is a random field, if there is no interferer, or if the channel is invalid. A
-    /// scenario from a file has a valid channel, and lacks an interferer only if relays have to locate it.
+    /// `None` if the interference is a random field, if there is no interferer, or if the channel is invalid. In a
+    /// scenario from a file, the channel is valid, and an interferer is missing only if the relays have to locate it.
     pub fn new(scenario: &Scenario, relays: u16) -> Option<Self> {
         let Interference::Sources(sources) = &scenario.interference else {
             return None;
@@ -170,7 +172,10 @@ impl Scene {
         .sum()
     }
 
-    /// Returns the height of a receiver at the altitude `h_m` above the interferer with index `at`, m.
+    /// Returns the height difference from interferer `at` to a receiver at the altitude `h_m`, m.
+    ///
+    /// `at` is the interferer's index in `sources`. The difference is positive for a receiver above the interferer, and
+    /// 0 within the altitude limits of the interferer.
     fn climb_m(&self, at: usize, h_m: f64) -> f64 {
         let [low, high] = self.heights_m.get(&at).copied().unwrap_or_default();
         h_m - h_m.clamp(low, high)
@@ -190,7 +195,7 @@ impl Scene {
         .sum()
     }
 
-    /// Returns the power of each interferer, W, and the offset from it to (`x`, `y`), m.
+    /// Returns for each interferer its power, W, and the offset from the interferer to (`x`, `y`), m.
     ///
     /// An interferer with an area is at the area's point nearest to (`x`, `y`).
     pub fn offsets(&self, x: f64, y: f64) -> impl Iterator<Item = (f64, [f64; 2])> {
@@ -258,7 +263,7 @@ impl Scene {
 
     /// Returns the linear SIR of the worst hop for relays with y = 0 and x = `along`, m.
     ///
-    /// Each relay has its own altitude. Returns 0 unless there is one position per relay.
+    /// The altitudes are those in `self.relays`. Returns 0 unless `along` has one position for each relay.
     pub fn sir_along(&self, along: &[f64]) -> f64 {
         let places = along.iter().zip(&self.relays);
         let places: Vec<(f64, f64)> = places.map(|(&x, relay)| (x, relay.altitude_m)).collect();
@@ -320,7 +325,7 @@ impl Scene {
     }
 }
 
-/// Sender of a signal that a relay receives: its position, its power and the path-loss factor.
+/// Sender of a signal: its position, its power, and the path-loss factor from it to a relay.
 #[derive(Debug, Clone, Copy)]
 pub struct Sender {
     /// Position of the node that sends over the hop.

@@ -55,7 +55,7 @@ pub struct Scenario {
     pub no_fly: Vec<NoFly>,
     /// Settings for relays that locate the interferer by measurements; `None` if relays do not locate it.
     ///
-    /// [`Self::interference`] is then their initial knowledge, if any.
+    /// If given, [`Self::interference`] is what the relays know before the first measurement.
     pub listen: Option<ListenSpec>,
     /// Noise of the receivers, both relays and Rx.
     pub noise: Noise,
@@ -82,7 +82,8 @@ pub struct TerrainSpec {
     pub mast_m: f64,
     /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
     ///
-    /// The height counts from the highest ground within the relay's position error.
+    /// The height is measured from the highest point of the ground below the positions that the relay may have, given
+    /// its position error.
     pub above_ground_m: f64,
     /// Greatest height of a relay above the ground, m, 0.1 to 1e4; `None` for no limit.
     ///
@@ -90,7 +91,8 @@ pub struct TerrainSpec {
     pub above_ground_max_m: Option<f64>,
     /// Error of the heights in the elevation files, m, 0 (its default) to 100.
     ///
-    /// Between two antennas, the planner assumes that the ground is higher by up to this error.
+    /// The planner adds the error to the height of the ground. It adds nothing at Tx and Rx, and the full error at
+    /// points at least 100 m away from both.
     pub error_m: f64,
 }
 
@@ -137,7 +139,7 @@ pub struct ChannelSpec {
 pub struct ListenSpec {
     /// True if the interferer moves. If true, missing settings have the defaults of [`Listen::following`].
     pub following: bool,
-    /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
+    /// Time from an agreement on positions to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
     /// Age at which a measurement has half the weight of a new one, s, 0.01 to 1e12.
     pub half_life_s: Option<f64>,
@@ -170,7 +172,7 @@ impl ListenSpec {
 /// Receiver noise: bandwidth and noise figure, or the noise power itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Noise {
-    /// Noise bandwidth, Hz, 0 (its default: no noise) to 1e12.
+    /// Noise bandwidth, Hz, 0 to 1e12. The default 0 means no noise.
     pub bandwidth_hz: f64,
     /// Noise figure of the receivers, dB, 0 to 60; 6 by default.
     pub figure_db: f64,
@@ -211,7 +213,7 @@ impl Noise {
 
     /// Returns the noise power that a mission uses for all receivers, W.
     ///
-    /// It is [`Self::receiver_w`] divided by the lower one of the antenna gains of the relays and of Rx.
+    /// It is [`Self::receiver_w`] divided by the smaller antenna gain: that of the relays or that of Rx.
     pub fn power_w(&self) -> f64 {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() / factor(relays.min(rx))
@@ -219,8 +221,8 @@ impl Noise {
 
     /// Returns true if there is noise, and the antenna gains of the relays and of Rx differ.
     ///
-    /// The mission's only noise power is that for the lower gain. That noise power is too high for the receivers with
-    /// the higher gain.
+    /// A mission has a single noise power, which is computed for the smaller gain. It is too high for the receivers
+    /// with the larger gain.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
@@ -280,7 +282,9 @@ pub struct BetaPoint {
     pub beta: f64,
 }
 
-/// Altitude and power of one relay that differ from the common values. At least one of them is set if read from a file.
+/// Altitude and power of one relay that differ from the common values.
+///
+/// In a scenario from a file, at least one of the two is `Some`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
     /// Fixed altitude of this relay, m, 0.1 to 1e4; `None` for the common altitude. Values outside of `altitude_min_m`
@@ -379,7 +383,7 @@ pub struct Planned {
     pub uavs: u16,
     /// Placement method of the relays.
     pub method: PlannedMethod,
-    /// Maximum relative error of the SIR that the placement method achieves, 1e-6 to 0.1.
+    /// Maximum relative error with which the placement method finds the best SIR, 1e-6 to 0.1.
     pub tolerance: f64,
     /// SIR of the chain's worst hop at the planned positions, dB, -400 to 400.
     pub sir_db: f64,

@@ -5,8 +5,10 @@
 
 use crate::snapshot::{Alarm, Urgency};
 
-/// Number of stored alarms above which ended alarms are dropped. The least urgent are dropped first; of equally urgent
-/// alarms the oldest. Alarms that still last are not dropped.
+/// Number of stored alarms above which ended alarms are dropped.
+///
+/// The least urgent ended alarm is dropped first; if several are equally urgent, the oldest. Alarms that have not ended
+/// are never dropped.
 pub const MOST: usize = 200;
 
 /// Reason of an alarm.
@@ -58,7 +60,9 @@ impl Reason {
         }
     }
 
-    /// Returns the text of an alarm about relay `subject`, or about its `reporters` for subject 0.
+    /// Returns the text of an alarm about relay `subject`, reported by the relays `reporters`.
+    ///
+    /// If `subject` is 0, the alarm is about the reporters or the ground station.
     fn text(self, subject: u16, reporters: &[u16]) -> String {
         let by = named(reporters);
         match self {
@@ -101,10 +105,10 @@ impl Reason {
     }
 }
 
-/// Alarm that lasts: its reason, its subject, its reporters and a note.
+/// Alarm that has not ended: its reason, its subject, its reporters and a note.
 ///
-/// The subject is the relay that the alarm is about; 0 if the alarm is about its reporters or the station. The
-/// reporters are the relays that have reported it, sorted. The note is appended to the text of the reason.
+/// The subject is the number of the relay that the alarm is about; 0 if it is about its reporters or the station. The
+/// reporters are the numbers of the relays that have reported the reason, sorted. The note is added to the text.
 pub type Lasting = (Reason, u16, Vec<u16>, String);
 
 #[derive(Debug)]
@@ -196,7 +200,7 @@ impl Alarms {
         }
     }
 
-    /// Begins and updates the alarms `lasting`, and ends all others.
+    /// Begins or updates the alarms in `lasting`, and ends all other alarms.
     pub fn settle(&mut self, time_s: f64, lasting: Vec<Lasting>) {
         for entry in self.entries.iter_mut().filter(|it| it.lasts()) {
             let same = |it: &Lasting| (it.0, it.1) == (entry.reason, entry.subject);
@@ -209,7 +213,7 @@ impl Alarms {
         }
     }
 
-    /// Returns the numbers of the relays that relay `by` has reported as lost, and not as found since then.
+    /// Returns the numbers of the relays that relay `by` still reports as lost.
     pub fn lost_for(&self, by: u16) -> Vec<u16> {
         let lost = self.lost().filter(|it| it.reporters.contains(&by));
         lost.map(|it| it.subject).collect()

@@ -32,11 +32,11 @@ pub struct Chain<'a> {
     pub mission: Option<&'a Mission>,
     /// End of the chain at which the station is.
     pub end: Side,
-    /// Number of relays that are listed even if they have not reported.
+    /// Number of relays that are always listed: relays 1 to this number, even those without a report.
     pub relays: u16,
     /// Profiles (altitude and power) that differ from the mission's common profile, by relay number.
     pub profiles: &'a [(u16, Profile)],
-    /// True if the relays have estimated the interferer of the mission.
+    /// True if the interferer in `mission` is an estimate of the relays.
     pub is_estimated: bool,
     /// Line on earth from Tx to Rx.
     pub axis: Option<&'a Axis>,
@@ -47,13 +47,12 @@ pub struct Chain<'a> {
 impl Chain<'_> {
     /// Returns the state of the chain at the time `now`, from the newest report of each relay.
     ///
-    /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`. A relay is also lost
-    /// while the alarm about its missing reports lasts, if it had neighbours, and another relay reports a neighbour
-    /// beyond it, or itself as the last relay before Tx or Rx and at most four numbers away, [`SILENT_AFTER`] later. The
-    /// relays `cleared`, which have no report, are not part of the snapshot.
+    /// A relay is shown as lost if its newest report is older than [`SILENT_AFTER`], and `alarms` has a report of
+    /// another relay that it is lost. It is also lost while the alarm about its missing reports lasts, if it had
+    /// neighbours and another relay's report, newer by [`SILENT_AFTER`], shows that the chain bypasses it.
     ///
-    /// `changed` are the times of the first reports of the relays' present neighbours, by relay: not every report has
-    /// neighbours. Without an entry they are as old as the report.
+    /// The relays `cleared`, which have no report, are left out. `changed` has for each relay the time of the first
+    /// report with its present neighbours; by default it is the time of the relay's report.
     pub fn snapshot(
         &self,
         now: Instant,
@@ -122,9 +121,9 @@ impl Chain<'_> {
         }
     }
 
-    /// Returns true if relay `by` reports that no relay is left on the side of the relay `number`.
+    /// Returns true if relay `by` reports no neighbour on its side toward the relay `number`.
     ///
-    /// It could only receive a relay at most [`REACH`] numbers away.
+    /// The relay `number` must be at most [`REACH`] numbers away, because `by` cannot receive a relay farther away.
     fn is_end(&self, by: &Report, number: u16) -> bool {
         let [before, after] = by.neighbours;
         let (toward, away) = if number < by.relay {
@@ -143,7 +142,7 @@ impl Chain<'_> {
         own.map_or(mission.config().common, |(_, profile)| *profile)
     }
 
-    /// Returns the hops through the relays at these positions, with their SIRs by the mission's model.
+    /// Returns the hops from Tx over the relays at these positions to Rx, with their SIRs by the mission.
     fn hops(&self, places: &[(u16, Placement)]) -> Vec<Hop> {
         let relays = places.iter().map(|(number, _)| Node::Relay(*number));
         let nodes: Vec<Node> = std::iter::once(Node::Tx)
@@ -173,7 +172,7 @@ impl Chain<'_> {
             .collect()
     }
 
-    /// Returns the interferer that the chain knows or has estimated.
+    /// Returns the interferer that the mission has, known before flight or estimated by the relays.
     fn interferer(&self) -> Option<InterfererSnapshot> {
         let source = self.mission?.known_source()?;
         Some(InterfererSnapshot {
@@ -189,7 +188,7 @@ impl Chain<'_> {
     }
 }
 
-/// Returns true if relay `by` reports a neighbour beyond the relay `number`.
+/// Returns true if relay `by` reports a neighbour farther away than relay `number`, on the same side.
 fn has_beyond(by: &Report, number: u16) -> bool {
     let [before, after] = by.neighbours;
     before.is_some_and(|it| (it + 1..by.relay).contains(&number))

@@ -10,9 +10,10 @@ pub fn db(linear: f64) -> f64 {
     10.0 * libm::log10(linear)
 }
 
-/// Returns the linear SIR of every hop from Tx to Rx, for relays at these positions, from relay 1 on.
+/// Returns the linear SIR of every hop from Tx to Rx, for relays at `places`, relay 1 first.
 ///
-/// Relays use the same formulas on board. A SIR is at most the largest f32, even if two positions nearly coincide.
+/// Relays use the same formulas on board. The largest possible SIR is the largest f32, even if two positions nearly
+/// coincide.
 pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let mut sender = Sender::transmitter(mission);
     let mut from_m = 0.0;
@@ -36,8 +37,8 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
 
 /// Returns the linear SIR of every hop from Rx to Tx. Entry k - 1 is received by node k - 1; node 0 is Tx.
 ///
-/// The formulas and the limit are the same as in [`hop_sirs`]. The list is empty if the interferer is unknown, and in a
-/// random field if the mission requires no SIR from Rx to Tx.
+/// The formulas and the largest possible SIR are those of [`hop_sirs`]. The list is empty if the interferer is unknown.
+/// For a random field it is empty unless the mission requires an SIR from Rx to Tx.
 pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let is_known = mission.known_source().is_some();
     let is_both_ways = mission.config().reverse > 0.0 && mission.field().is_some();

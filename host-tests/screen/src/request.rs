@@ -22,7 +22,9 @@ const MAX_BODY: usize = 4 * 1024;
 /// Largest number of headers of a request.
 const MAX_HEADERS: usize = 64;
 
-/// Content security policy of the page: it permits only the page's own files and its embedded style.
+/// Content security policy of the page.
+///
+/// It permits only files of this server and the style sheet that is embedded in the page.
 static POLICY: LazyLock<String> = LazyLock::new(|| {
     format!(
         "default-src 'none'; script-src 'self'; style-src 'nonce-{}'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
@@ -31,9 +33,9 @@ static POLICY: LazyLock<String> = LazyLock::new(|| {
     )
 });
 
-/// Random text by which the browser accepts the embedded style.
+/// Random text that permits the style sheet embedded in the page.
 ///
-/// It is both in the page and in the content security policy.
+/// It is both in the page and in the content security policy, and the browser compares the two.
 static NONCE: LazyLock<String> =
     LazyLock::new(|| format!("{:016x}", RandomState::new().hash_one(0)));
 
@@ -104,14 +106,14 @@ const TASKS: [(&str, Task); 3] = [
     ("/clear", Task::Clear),
 ];
 
-/// Task that a page gives to the program.
+/// Task that a page gives to the program that serves it, for example a ground station.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Task {
-    /// Computes where the relays would fly with the values in the request's body.
+    /// Computes where the relays would fly with the mission parameters in the request's body.
     Preview,
     /// Uploads a mission that a preview has shown. The request's body contains the preview's number and digest.
     Upload,
-    /// Clear the lost relay whose number is in the body.
+    /// Clears the lost relay whose number is in the request's body.
     Clear,
 }
 
@@ -150,7 +152,7 @@ pub(crate) enum Answer {
 pub(crate) const TOO_LARGE: Answer = Answer::Refused(431, "Request Header Fields Too Large");
 /// Refusal of a request that did not arrive in time.
 pub(crate) const TOO_SLOW: Answer = Answer::Refused(408, "Request Timeout");
-/// Refusal of a connection or a stream beyond a limit, and of a task that the program does not answer.
+/// Refusal if too many connections, streams or tasks are open, or if a task is not answered.
 pub(crate) const FULL: Answer = Answer::Refused(503, "Service Unavailable");
 /// Refusal of a request without a password.
 const NO_PASSWORD: Answer = Answer::Refused(401, "Unauthorized");
@@ -166,9 +168,9 @@ const BODY_TOO_LARGE: Answer = Answer::Refused(413, "Content Too Large");
 const MALFORMED: Answer = Answer::Refused(400, "Bad Request");
 const FOREIGN: Answer = Answer::Refused(403, "Forbidden");
 
-/// Returns the answer to a request, and the request's body; `None` while `bytes` are incomplete.
+/// Returns the answer to the request in `bytes`, and its body; `None` while the request is incomplete.
 ///
-/// `own` is the address at which the request arrived.
+/// `own` is the local address at which the request arrived.
 pub(crate) fn answer<'a>(
     bytes: &'a [u8],
     own: SocketAddr,
@@ -343,7 +345,9 @@ fn is_own(host: &str, own: SocketAddr) -> bool {
     named.is_some_and(|named| named.to_canonical() == ip)
 }
 
-/// Returns the head of the response to a request, without a body for the stream of snapshots.
+/// Returns the status line and the headers of the response to a request.
+///
+/// The stream of snapshots has no length in its headers, because its body has no end.
 pub(crate) fn head(answer: Answer) -> String {
     match answer {
         Answer::File(media, content) => written(200, "OK", media, Some(content.len())),
@@ -365,8 +369,10 @@ pub(crate) fn picture(tile: Option<(&str, Vec<u8>)>) -> Vec<u8> {
     response
 }
 
-/// Returns the response with the program's answer to a task. The response is an error if the program does not do the
-/// task.
+/// Returns the HTTP response with the program's reply to a task.
+///
+/// The response has the status 200 with the JSON text of the reply, or 409 with the reason why the program does not do
+/// the task.
 pub(crate) fn replied(reply: &Result<String, String>) -> String {
     let (status, reason, media, text) = match reply {
         Ok(json) => (200, "OK", "application/json", json),

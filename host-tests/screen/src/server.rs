@@ -28,7 +28,7 @@ use crate::snapshot::{LogLine, Snapshot};
 /// Largest number of open connections. Further connections get the status 503.
 pub const MAX_CONNECTIONS: usize = 64;
 
-/// Largest number of open connections from one other computer. Connections remain for further computers.
+/// Largest number of open connections from one other computer, so that several computers can connect.
 pub const MAX_PER_ADDRESS: usize = 16;
 
 /// Largest number of open streams of snapshots, so that connections remain for files and tasks.
@@ -37,7 +37,7 @@ pub const MAX_STREAMS: usize = 56;
 /// Number of connections that are reserved for this computer.
 const OWN: usize = 8;
 
-/// Largest number of connections without a password yet, from all other computers together.
+/// Largest number of connections from all other computers that have not sent the password yet.
 const MAX_UNKNOWN: usize = 16;
 
 /// Largest number of connections from this computer that have not sent the password yet.
@@ -55,19 +55,25 @@ const REQUEST_TIME: Duration = Duration::from_secs(5);
 /// Time within which a browser has to receive one file or one snapshot.
 const WRITE_TIME: Duration = Duration::from_secs(10);
 
-/// Time for which the server reads and ignores the rest of a request, so that its answer arrives.
+/// Time for which the server reads and ignores the rest of a request after its answer.
+///
+/// Otherwise unread bytes would reset the connection before the answer arrives at the browser.
 const LINGER_TIME: Duration = Duration::from_millis(200);
 
 /// Least time between two snapshots that browsers receive. The program may show snapshots more often.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Time without a new snapshot after which a comment is sent, to detect a browser that has left.
+/// Time without a new snapshot after which the server sends an empty comment to a browser.
+///
+/// If the browser has closed the connection, sending fails.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// Largest number of tasks that wait for the program. Further tasks get the status 503.
 const TASKS: usize = 4;
 
-/// Time within which the program has to begin a task. After this time it has the same time again for the answer.
+/// Time within which the program has to begin a task.
+///
+/// A program that has begun in time has the same time once more to answer the task.
 const REPLY_TIME: Duration = Duration::from_secs(5);
 
 /// Time for which the server remembers a wrong password.
@@ -76,12 +82,14 @@ const TRIES_TIME: Duration = Duration::from_secs(60);
 /// Largest number of wrong passwords in [`TRIES_TIME`] from one address.
 const MAX_TRIES: usize = 5;
 
-/// Largest number of wrong passwords in [`TRIES_TIME`] from all addresses.
+/// Largest number of wrong passwords in [`TRIES_TIME`] from all addresses together.
 ///
-/// From this number on, the server refuses requests of all other computers.
+/// When this number is reached, the server refuses the requests of all other computers.
 const MAX_ALL_TRIES: usize = 100;
 
-/// Stack size of a connection's thread, bytes. It suffices to decompress a map tile; a stack overflow would end the program.
+/// Stack size of a connection's thread, bytes.
+///
+/// It suffices to decompress a map tile. A smaller stack could overflow, which ends the program.
 const STACK: usize = 1024 * 1024;
 
 /// Pictures of the map below the chain: tiles of the Web Mercator projection from the program's file.
@@ -115,7 +123,9 @@ pub struct Screen {
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// Random identifier of this run of the program. When it changes, the page clears its alarms and flown paths.
+    /// Random identifier of this run of the program.
+    ///
+    /// When the page receives another identifier, it clears its alarms and the drawn paths of the drones.
     run: String,
     inbox: Mutex<Inbox>,
     is_new: Condvar,
@@ -135,14 +145,16 @@ struct Shared {
 /// State of a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Stage {
-    /// The connection has not sent a request with the right password yet. Does not occur without a password.
+    /// The connection has not sent a request with the right password yet.
+    ///
+    /// This state does not occur if the server has no password.
     Unknown,
     Known,
     /// Snapshots are being sent.
     Streaming,
 }
 
-/// Newest snapshot that is not yet converted to JSON, and the log lines that are not yet converted.
+/// Newest snapshot and log lines that are still to be converted to JSON.
 #[derive(Debug, Default)]
 struct Inbox {
     snapshot: Option<Snapshot>,
@@ -159,7 +171,7 @@ struct Outbox {
     /// Time when the newest snapshot was converted; `None` before the first snapshot.
     written: Option<Instant>,
     lines: VecDeque<Arc<str>>,
-    /// Number of log lines converted to JSON so far, also those that are no longer stored.
+    /// Number of log lines converted to JSON so far, including lines that are no longer stored.
     line_count: u64,
 }
 
@@ -192,14 +204,17 @@ pub struct Post {
     /// Address of the browser.
     pub peer: IpAddr,
     reply: SyncSender<Result<String, String>>,
-    /// True once the program has begun the task, or the server has refused it because the program was late.
+    /// True once the program has begun the task, or the server has refused it.
+    ///
+    /// The server refuses a task that the program has not begun in time.
     is_settled: Arc<AtomicBool>,
 }
 
 impl Post {
-    /// Marks the task as begun. Returns false if the program must not do it, because the server has refused it.
+    /// Marks the task as begun; returns false if the program must not do it.
     ///
-    /// After true the server still waits for the program's answer.
+    /// The result is false if the server has refused the task meanwhile. If it is true, the server still waits for the
+    /// reply.
     pub fn begin(&self) -> bool {
         !self.is_settled.swap(true, Ordering::SeqCst)
     }
@@ -284,9 +299,9 @@ impl Screen {
 
     /// Passes a snapshot to the threads that serve the browsers, and does not wait for them.
     ///
-    /// It replaces an earlier snapshot that was not sent yet; the log lines of both are sent. Before sending, the
-    /// server removes positions and SIRs that are not finite, positions that are too far away, and invisible characters
-    /// in texts.
+    /// The snapshot replaces an earlier one that was not sent yet, but the log lines of both are sent. Before sending,
+    /// the server removes positions and SIRs that are not finite, positions that are too far away, and invisible
+    /// characters in texts.
     pub fn show(&self, mut snapshot: Snapshot) {
         let lines = std::mem::take(&mut snapshot.log);
         let mut inbox = lock(&self.shared.inbox);
@@ -403,11 +418,11 @@ impl Shared {
         }
     }
 
-    /// Returns `answer`, or a refusal after too many wrong passwords, from `peer` or from all addresses.
+    /// Returns `answer`, or a refusal after too many wrong passwords from `peer` or from all addresses.
     ///
-    /// If `answer` refuses a wrong password, this password is counted. After too many, the server refuses requests with the right password,
-    /// too. It still accepts tasks, because their token cannot be guessed. It refuses this computer only for wrong passwords from this
-    /// computer, so that a tunnel to it still works.
+    /// Counts the wrong password if `answer` refuses one. The refusal applies to right passwords, too, but not to
+    /// tasks, because their token cannot be guessed. Requests from this computer are refused only after wrong passwords
+    /// from this computer, so that a tunnel to it still works.
     fn limited(&self, answer: Answer, peer: IpAddr) -> Answer {
         if self.access.password.is_none() || matches!(answer, Answer::Post(..)) {
             return answer;
@@ -515,7 +530,7 @@ fn counted_as(peer: IpAddr) -> IpAddr {
 struct Counted(Arc<Shared>, (IpAddr, Stage));
 
 impl Counted {
-    /// Creates the entry of a connection from `peer`; `None` if this connection would exceed a limit.
+    /// Counts a new connection from `peer`; returns `None` if the connection would exceed a limit.
     fn new(shared: &Arc<Shared>, peer: IpAddr) -> Option<Self> {
         let peer = counted_as(peer);
         let stage = match shared.access.password {
@@ -542,7 +557,9 @@ impl Counted {
         })
     }
 
-    /// Records the state that follows from `answer`. Returns false if it is a stream, but too many are open.
+    /// Records the new state of the connection that follows from `answer`.
+    ///
+    /// Returns false if `answer` is a stream of snapshots, but too many streams are open.
     fn accept(&mut self, answer: Answer) -> bool {
         let stage = match answer {
             Answer::Events => Stage::Streaming,

@@ -13,9 +13,9 @@ use serde::{Serialize, Serializer};
 /// The page shows texts as plain text, without control characters and direction marks, and cut at 300 characters.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct Snapshot {
-    /// Time of the state, s since the start of the flight or the run.
+    /// Time of the state, s since the start of the flight or of the program.
     pub time_s: Option<f64>,
-    /// Name of the chain, for the heading.
+    /// Name of the chain, which the page shows as its heading.
     pub name: Option<String>,
     /// Origin and direction of the coordinates on earth.
     pub frame: Option<Frame>,
@@ -36,9 +36,11 @@ pub struct Snapshot {
     /// Ground below the line from Tx to Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground: Option<GroundProfile>,
-    /// Alarms, both lasting and ended. Each has a number of its own.
+    /// Alarms of the flight, both lasting and ended. No two alarms have the same number.
     pub alarms: Vec<Alarm>,
-    /// State of the tasks that the page can give, for `desk.js`; `None` if it cannot give tasks.
+    /// Data for the page's script `desk.js`, which gives tasks to the program.
+    ///
+    /// `None` if the page cannot give tasks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub desk: Option<serde_json::Value>,
     /// Log lines since the previous snapshot. The server keeps the last 1000 lines.
@@ -60,7 +62,7 @@ pub struct Frame {
 pub struct Position {
     /// Distance from Tx along the line toward Rx, m.
     pub x_m: f64,
-    /// Distance from the line, m, positive to the right as seen toward Rx.
+    /// Distance from the line Tx-Rx, m, positive to the right as seen from Tx toward Rx.
     pub y_m: f64,
     /// Altitude above the ground of Tx, m.
     pub altitude_m: Option<f64>,
@@ -189,15 +191,17 @@ pub struct InterfererSnapshot {
 /// Geofence: a rectangle along the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Fence {
-    /// Smallest and largest x, m.
+    /// Smallest and largest distance x from Tx toward Rx, m.
     pub x_m: [f64; 2],
-    /// Smallest and largest y, m.
+    /// Smallest and largest lateral position y, m, positive to the right as seen from Tx toward Rx.
     pub y_m: [f64; 2],
-    /// Lowest and highest altitude, m.
+    /// Lowest and highest altitude of the geofence, m.
     pub altitude_m: Option<[f64; 2]>,
 }
 
-/// Ground below the line from Tx to Rx. Its heights and the relays' altitudes have the same zero.
+/// Ground below the line from Tx to Rx.
+///
+/// Its heights are measured from the same level as the relays' altitudes.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct GroundProfile {
     /// Distance from Tx to Rx, m.
@@ -220,7 +224,9 @@ pub enum Urgency {
     Critical,
 }
 
-/// Alarm for the operator. The page gives a sound until the operator acknowledges the alarm or it has ended.
+/// Alarm for the operator.
+///
+/// The page gives a sound until the operator acknowledges the alarm or the alarm ends.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Alarm {
     /// Number of the alarm, from 1, which no other alarm of the flight has.
@@ -242,6 +248,6 @@ pub struct Alarm {
 pub struct LogLine {
     /// Time of the event, s on the scale of [`Snapshot::time_s`].
     pub time_s: f64,
-    /// Text of the line, which names the relay.
+    /// Text of the line. It names the relay, if the event is about one.
     pub text: String,
 }

@@ -27,33 +27,38 @@ use crate::alarms::{Alarms, Lasting, Reason, named};
 use crate::chain::{Chain, SILENT_AFTER, control, hold_reason, phase, seconds};
 use crate::snapshot::{LogLine, Snapshot};
 
-/// Time without any frame from which no alarm about a single relay begins. The station itself may be cut off then.
+/// Time without any received frame after which no alarm about a single silent relay begins.
+///
+/// After this time the station itself may be cut off from the chain.
 const QUIET_AFTER: Duration = Duration::from_millis(2_000);
 
-/// Age of a relay's report from which reports of the relays behind it may no longer arrive.
+/// Age of a relay's newest report from which reports of relays farther away may be missing, too.
+///
+/// Reports of relays farther away from the station pass through this relay.
 const UNSURE_AFTER: Duration = Duration::from_millis(2_500);
 
-/// Age of a relay's report from which reports of the relays behind it bypass the relay. The chain has closed the gap by
-/// then.
+/// Age of a relay's newest report from which the chain bypasses this relay.
+///
+/// The reports of relays farther away from the station then arrive again.
 const CLOSED_AFTER: Duration = SILENT_AFTER.times(2);
 
 /// Time for which the alarm about rejected frames lasts after the last rejected frame.
 const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 
-/// Time without approach to its setpoint after which a drone is reported.
+/// Time after which a drone that comes no nearer to its setpoint causes an alarm.
 ///
 /// Only every eighth report contains the setpoint: a drone on its way to a new setpoint may therefore seem to fly away
 /// from the previous setpoint for 10 s.
 const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 
-/// Time after a relay's return from which no relay refuses it any more for its earlier mission.
+/// Time after which a relay that has returned should no longer be refused for its earlier mission.
 ///
-/// Relays report the refusal for up to two minutes after its last cause.
+/// A relay reports that it refuses another relay for up to two minutes after the last frame that it refused.
 const LINGERS: Duration = Duration::from_millis(150_000);
 
-/// Time for which a report of a refused relay holds while later reports name another refused relay.
+/// Time for which a report of a refused relay stays valid while later reports name another relay.
 ///
-/// A relay names the refused relays on its two sides in turn.
+/// A relay that refuses one relay on each side names the two in alternate reports.
 const TURNS: Duration = Duration::from_millis(20_000);
 
 /// Distance from a setpoint below which a drone has reached it, m.
@@ -77,20 +82,21 @@ struct Known {
     was_engaged: bool,
     is_released: bool,
     is_link_lost: bool,
-    /// Time of the first of the latest reports with an agreed position but no lease.
+    /// Time of the first of the newest consecutive reports with an agreed position but no lease.
     ///
     /// `None` if the newest report has no agreed position or has a lease.
     unleased_at: Option<Instant>,
     /// Slowly decaying maximum of the time between two reports of this relay.
     longest_age: Duration,
-    /// Time when the drone came nearest to its setpoint, and the distance then, m. `None` while the relay does not move
-    /// the drone, or the drone has arrived.
-    nearest: Option<(Instant, f32)>,
-    /// Time of the first report of the present neighbours.
-    neighbours_at: Instant,
-    /// Time of the first report after a silence; `None` before a silence.
+    /// Time when the drone came nearest to its setpoint, and its distance from the setpoint then, m.
     ///
-    /// In this silence reports of relays behind this one were possibly lost.
+    /// `None` while the relay does not move the drone, or the drone has arrived.
+    nearest: Option<(Instant, f32)>,
+    /// Time of the first report that has the same neighbours as the newest report.
+    neighbours_at: Instant,
+    /// Time of the first report after the relay's last silence; `None` before a silence.
+    ///
+    /// Reports of relays farther away from the station may have been lost in this silence.
     returned_at: Option<Instant>,
 }
 
@@ -144,7 +150,7 @@ impl Known {
         });
     }
 
-    /// Returns the age of the relay's newest report from which the relay counts as silent.
+    /// Returns the age of the relay's newest report at which the relay begins to count as silent.
     ///
     /// The age is longer if the times between this relay's reports are often long. Before a relay's first agreement its
     /// reports may be delayed by 6 s.
@@ -182,11 +188,11 @@ impl Known {
 /// Refusal of a relay for another mission or key.
 #[derive(Debug)]
 struct Refused {
-    /// Relays that refuse it, and the times of their last reports of the refusal.
+    /// Relays that refuse the refused relay, and the times of their last reports of the refusal.
     by: BTreeMap<u16, Instant>,
     /// Time of the first report of the refusal.
     since: Instant,
-    /// Time from which the refused relay has reported without a break; `None` while it does not report.
+    /// Time since which the refused relay has reported without a silence; `None` while it does not report.
     back_at: Option<Instant>,
 }
 
@@ -195,23 +201,24 @@ struct Refused {
 pub struct StationView {
     alarms: Alarms,
     known: BTreeMap<u16, Known>,
-    /// Neighbours that have reported a relay as silent, with the time of each one's last such report.
+    /// Neighbours that have reported a relay as silent, each with the time of its last such report.
     ///
     /// The key of the outer map is the silent relay, the key of the inner map the neighbour.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     refused: BTreeMap<(Reason, u16), Refused>,
-    /// Lost relays that an operator has cleared, and the times of the acts.
+    /// Lost relays that an operator has cleared from the display, with the time of each command.
     cleared: BTreeMap<u16, Instant>,
     /// Log lines of the next snapshot.
     acts: Vec<LogLine>,
     frames: Frames,
     /// Time of the last accepted frame; before the first frame it is the time of the start.
     frame_at: Instant,
-    /// Time of the first frame after the last silence of the whole chain. Alarms measure a relay's silence from this
-    /// time at the earliest.
+    /// Time of the first frame after the last time in which no frame arrived from the whole chain.
+    ///
+    /// Alarms count a relay's silence from this time or later.
     resumed_at: Instant,
     rejected_at: Option<Instant>,
-    /// Newest version of the mission that relays fly, and the time when the station first received it.
+    /// Newest mission version that relays report, and the time when the station first received it.
     version: Option<(u16, Instant)>,
 }
 
@@ -223,7 +230,7 @@ impl StationView {
 
     /// Removes a lost relay and its alarm from the snapshots, until a report newer than `now` arrives.
     ///
-    /// `reports` are reports that have arrived; those of the last snapshot are known.
+    /// `reports` are reports received since the last snapshot; older ones may be included.
     ///
     /// # Errors
     /// The reason if the relay is not lost: it has reported within [`SILENT_AFTER`], or has no alarm that it is lost.
@@ -282,7 +289,9 @@ impl StationView {
         }
     }
 
-    /// Stores a report and logs the changes. Returns false if the report is not newer than the stored report.
+    /// Stores a relay's report, and appends a log line for each change since the relay's stored report.
+    ///
+    /// Returns false if `report` is not newer than the stored report.
     fn take(&mut self, now: Instant, report: Report, log: &mut Vec<LogLine>) -> bool {
         let number = report.relay;
         let before = self.known.get(&number).map(|it| it.report);
@@ -513,10 +522,10 @@ impl StationView {
         all
     }
 
-    /// Returns true if reports of relay `number` may be missing because a nearer relay is or was silent.
+    /// Returns true if reports of relay `number` may be missing because of a silent relay on their way.
     ///
-    /// The nearer relay, on the way to the station, has been silent for a short time only: the chain has not closed the
-    /// gap yet. Or it has just returned: reports that went through it are on their way again.
+    /// The silent relay is between relay `number` and the station. Either its silence is so short that the chain does
+    /// not bypass it yet, or it has just returned, so that reports through it may still be on their way.
     fn may_be_behind(&self, now: Instant, end: Side, number: u16) -> bool {
         let mut nearer = self.known.values().filter(|it| match end {
             Side::Upstream => it.report.relay < number,
@@ -529,7 +538,7 @@ impl StationView {
         })
     }
 
-    /// Describes which relays do not receive a neighbour now, for an alarm about relays without reports.
+    /// Lists which relays report that they do not receive a neighbour, for an alarm about missing reports.
     fn gaps(&self, now: Instant) -> String {
         let fresh = self.known.values().map(|it| &it.report);
         let fresh = fresh.filter(|it| now.since(it.at) < SILENT_AFTER);
@@ -548,7 +557,7 @@ fn distance_to_fly_m(report: &Report) -> Option<f32> {
     flies.then(|| way_m.hypot(at.altitude_m - to.altitude_m))
 }
 
-/// Returns true if the report is a full one. Most reports contain only position and control state.
+/// Returns true if the report has details. Most reports contain only position and control state.
 fn has_details(report: &Report) -> bool {
     report.agreed.is_some() || report.neighbours.iter().any(Option::is_some)
 }

@@ -2,15 +2,16 @@
 
 use super::parts::Body;
 
-/// Numbers of the paper's scenario in the order of an offer.
+/// First five numbers of the paper's mission, in the order in which a mission offer has them.
 ///
-/// Distance and minimum separation, m; power of Tx, W; common altitude, m; common power, W.
+/// Distance from Tx to Rx, m; minimum separation, m; power of Tx, W; altitude of every relay, m; power of every relay,
+/// W.
 const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 
-/// Path-loss factors of the paper, with and without line of sight.
+/// Path-loss factors of the paper: with line of sight, then without.
 const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
 
-/// Tx and Rx: latitude, longitude (1e-7 degrees), height (mm), with a distance of exactly 1000 m.
+/// Positions of Tx, then Rx: latitude and longitude, 1e-7 degrees, and height, mm. Their distance is exactly 1000 m.
 const SITES: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -56,10 +57,10 @@ impl Body<'_, '_> {
         self.word(answer);
     }
 
-    /// Appends Tx and Rx positions, chosen by `choice`.
+    /// Appends the positions of Tx and Rx, chosen by `choice`.
     ///
-    /// In most cases all numbers are 0, which means no positions. Otherwise the positions are arbitrary, or their
-    /// distance is 1000 m as in the paper.
+    /// In most cases all six numbers are 0, so that the offer has no positions. Otherwise the numbers are arbitrary, or
+    /// the distance from Tx to Rx is 1000 m as in the paper.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -71,7 +72,9 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends a mission version: the newest of the tested relay, one of the three after it, or any number.
+    /// Appends the version of the offered mission.
+    ///
+    /// It is the newest version that the tested relay stores, one of the next three versions, or any number.
     fn version(&mut self) {
         let held = self.state.held.version;
         let version = match self.input.byte() {
@@ -81,7 +84,7 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends the mission's number of relays, mostly the number in the mission loaded before flight.
+    /// Appends the offered mission's number of relays: mostly that of the mission loaded before flight.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.state.relays,
@@ -90,7 +93,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission with a changed interferer, an altitude range and a lateral range.
+    /// Appends the paper's mission with another interferer, an altitude range and a lateral range.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));
@@ -130,7 +133,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, 1e5));
     }
 
-    /// Appends the three path-loss factors `losses`. In rare cases one of them is replaced by any number.
+    /// Appends the mission's three path-loss factors `losses`. In rare cases any number replaces one of them.
     fn losses(&mut self, mut losses: [f64; 3]) {
         let which = usize::from(self.input.byte());
         if let Some(loss) = losses.get_mut(which) {

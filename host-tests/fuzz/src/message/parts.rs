@@ -5,16 +5,16 @@ use uav_relay::wire::digest::MissionId;
 
 use crate::input::Input;
 
-/// State of the tested relay, as far as a neighbour can know this state.
+/// State of the tested relay that a neighbour can know from the relay's frames and the mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
     /// Digest of the mission loaded before flight.
     pub digest: u16,
     /// Number of relays in the mission loaded before flight.
     pub relays: u16,
-    /// Digest of the mission in use.
+    /// Digest of the mission in use: the one loaded before flight, or one uploaded later.
     pub flown: u16,
-    /// Version and digest of the newest stored mission, in use or not.
+    /// Version and digest of the newest mission that the relay stores, even if it is not in use yet.
     pub held: MissionId,
     /// Last accepted view (membership of the chain).
     pub view: ViewId,
@@ -57,7 +57,9 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Appends the number of a pass, and the digest of mission and view. Rarely the view is a wrong one.
+    /// Appends a pass number, and the sum of the mission's and the view's digest; rarely a wrong sum.
+    ///
+    /// A pass is a message along the chain and back; a view is a membership of the chain.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.state.view);
@@ -69,10 +71,10 @@ impl Body<'_, '_> {
         self.word(self.state.flown.wrapping_add(mark));
     }
 
-    /// Appends the name of a view (membership of the chain).
+    /// Appends the identifier of a view (membership of the chain).
     ///
-    /// It is the relay's accepted view, an earlier one or any one. Or the view has one of the next numbers, with one of
-    /// the first four relays as proposer.
+    /// It is 0, any number, or an identifier near that of the relay's accepted view: the same one, an earlier number,
+    /// or a number up to 3 higher with one of the relays 1 to 4 as proposer.
     pub(super) fn view(&mut self) {
         let own = self.state.view;
         let view = match self.input.byte() {
@@ -96,7 +98,7 @@ impl Body<'_, '_> {
         self.relay();
     }
 
-    /// Appends a sequence number as in heartbeats, mostly 0 (none) to 11.
+    /// Appends a sequence number as in heartbeats: mostly 0 (which means none) to 11, rarely any number.
     pub(super) fn request_number(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
@@ -114,10 +116,10 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// Appends the last part of a lease renewal: the flag `in_place`, and often two nodes.
+    /// Appends the last part of a lease renewal: the flag `in_place`, and often two node numbers.
     ///
-    /// In half of the messages the numbers of the leaving and of the joining node follow. At least one of the two is
-    /// not 0.
+    /// In half of the messages the numbers of the leaving and of the joining node follow the flag. At least one of the
+    /// two numbers is not 0.
     pub(super) fn renewal_nodes(&mut self) {
         self.small(0, 1);
         if self.small(0, 1) == 1 {
@@ -184,8 +186,9 @@ impl Body<'_, '_> {
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// Appends a list of up to `most` floats, with its count. All floats are equal, or each of them is from `low` to
-    /// `high`.
+    /// Appends the number of floats in a list, up to `most`, and then the floats.
+    ///
+    /// Either all floats have the same value, or each one has its own value from `low` to `high`.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();
@@ -201,7 +204,8 @@ impl Body<'_, '_> {
 
     /// Appends the number of a lease renewal, mostly small, and a digest.
     ///
-    /// The digest is that of mission and view (membership of the chain), rarely a wrong one.
+    /// The digest is the sum of the mission's digest and the digest of the view (membership of the chain). Rarely it is
+    /// wrong.
     pub(super) fn pulse_number(&mut self) {
         self.request_number();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -209,9 +213,10 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission: the newest stored, the initially loaded one, or a third.
+    /// Returns version and digest of a mission, chosen by the input bytes.
     ///
-    /// A third mission has a newer, older or arbitrary version. The input bytes decide.
+    /// It is the newest stored mission, the mission loaded before flight, or one with a newer, older or arbitrary
+    /// version.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {
@@ -246,9 +251,10 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the 16-bit digest of a view, which messages add to the mission's digest.
+/// Returns the 16-bit digest of a view (membership of the chain).
 ///
-/// The digest is the lower half of the view's name plus the byte-swapped upper half.
+/// Messages contain the sum of this digest and the mission's digest. The view's digest is the lower half of the view's
+/// identifier plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

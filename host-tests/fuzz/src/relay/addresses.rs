@@ -26,9 +26,10 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
     }
 }
 
-/// Returns a node number beyond the neighbour of relay `index` at `side` (0 upstream, 1 downstream).
+/// Returns the number of a node farther away from relay `index` than its neighbour at `side`.
 ///
-/// The node is `more` relays farther away than this neighbour. Its number is at least 0.
+/// `side` is 0 upstream, 1 downstream. The node is `more` numbers farther away than the neighbour; upstream the result
+/// is at least 0.
 pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {
     let distance = 1 + more as u16;
     if side == 1 {

@@ -13,7 +13,7 @@ const NEAR: u16 = 4;
 /// Network number of every fuzzed relay.
 pub const NETWORK: u16 = 9;
 
-/// Checker of a relay's frames. The checker stores some numbers in the relay's last frames, such as the pass number.
+/// Checker of a relay's frames. It keeps the numbers, such as the pass number, that the last frames had.
 ///
 /// A pass is a message along the chain and back.
 #[derive(Clone, Debug)]

@@ -19,7 +19,7 @@ fn method(watched: &Watched) -> &'static str {
     }
 }
 
-/// Returns the sum of each statistics counter over some relays.
+/// Adds up the statistics counters of `relays`: one sum for each counter.
 fn counted<'a>(relays: impl IntoIterator<Item = &'a Watched>) -> [u64; 23] {
     relays.into_iter().fold([0; 23], |sums, watched| {
         let counters = all(watched.relay().stats());

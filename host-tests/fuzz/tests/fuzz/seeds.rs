@@ -18,7 +18,9 @@ use uav_relay_fuzz::{TARGETS, setting};
 
 use super::folder;
 
-/// Number of recorded frames of a simulated flight: several of every kind of message along the chain.
+/// Number of frames taken from a simulated flight; they include several of each kind of pass message.
+///
+/// A pass is a message along the chain and back.
 const FRAMES: usize = 24;
 
 const MOST_WAKES: u8 = 64;
@@ -27,9 +29,10 @@ fn golden() -> Vec<Frame> {
     Vectors::load().unwrap().frames
 }
 
-/// Returns corpus inputs for the target `deframe`: test vectors, with and without noise between them.
+/// Returns corpus inputs for the target `deframe`: test vectors, in one input with noise between them.
 ///
-/// Each input begins with two lengths, bytes. The rest of the input is cut into pieces of these two lengths in turn.
+/// The first two bytes of an input are two lengths. The remaining bytes are cut alternately into pieces of these
+/// lengths.
 fn deframe() -> Vec<Vec<u8>> {
     let wires: Vec<_> = golden().into_iter().map(|frame| frame.wire).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();
@@ -70,9 +73,10 @@ fn missions() -> Vec<Vec<u8>> {
     align.chain(joint).chain(adjust).collect()
 }
 
-/// Returns inputs for the target `chain`: all missions and operations, frame faults, mission uploads.
+/// Returns corpus inputs for the target `chain`.
 ///
-/// An operation comes between two rounds of messages.
+/// Together they contain all missions and operations, frame faults and mission uploads. Rounds of messages come before
+/// and after each operation.
 fn chain() -> Vec<Vec<u8>> {
     let with = |mission: &[u8], operations: &[u8]| {
         // Seed, four relays without individual settings, to the end.
@@ -139,17 +143,19 @@ fn relay() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns input bytes with an offer of the next mission version, from `side`. The offered mission is the paper's
-/// with the interferer at another position.
+/// Returns the bytes of a mission offer to the tested relay from the neighbour at `side`.
+///
+/// The offer has the next mission version. Its mission is the paper's with the interferer at another position.
 fn offer(side: u8) -> Vec<u8> {
     let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
     [&head[..], &interferer, &[255, 1, 1, 0, 0]].concat()
 }
 
-/// Returns an input: the second of four relays with a key receives a mission, and adopts it.
+/// Returns an input: the second of four relays, with a key, receives a new mission and adopts it.
 ///
-/// The chain adopts the mission by a new membership view. `how` is the byte of the input that selects key and wiring.
+/// The chain adopts the mission by a new view (membership of the chain). `how` is the input byte that selects the
+/// signing key and the wiring.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
     let asks = [9, 0, 10, 0, 2, 1, 0, 0, 0, 1, 1, 0];
@@ -172,8 +178,9 @@ fn uploaded(how: u8) -> Vec<u8> {
     parts.concat()
 }
 
-/// Returns an input: an end relay of four with a key receives two queries and offers from the ground. `index` 0 is
-/// the first relay, at Tx; the other is the last, at Rx.
+/// Returns an input: an end relay of four receives two queries and two mission offers from the ground.
+///
+/// The relay has a signing key. `index` is the relay's index from 0: 0 is next to Tx, 3 next to Rx.
 fn by_the_ground(index: u8) -> Vec<u8> {
     let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
     let side = u8::from(index > 0);
@@ -182,9 +189,10 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns an input: the last of four relays receives views, a guard message and late frames.
+/// Returns an input: the last of four relays receives proposed views, a guard message and late frames.
 ///
-/// The relay has a motion guard and a position. `wiring` is the byte of the input that selects the wiring.
+/// A view is a membership of the chain. The relay has a collision guard and a position. `wiring` is the input byte that
+/// selects the wiring.
 fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];
@@ -198,7 +206,9 @@ fn formed(wiring: u8) -> Vec<u8> {
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
 
-/// Returns an input: a relay with a key receives a frame of another mission, and a frame without a tag.
+/// Returns an input: a relay with a signing key receives two frames that it refuses.
+///
+/// One frame has the digest of another mission; the other frame has no tag (signature).
 fn refused() -> Vec<u8> {
     let head = [0, 3, 0, 1, 8, 0, 0, 0, 0, 1, 0];
     let other = [9, 0, 3, 255, 0, 0];

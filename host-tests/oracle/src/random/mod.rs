@@ -35,7 +35,7 @@ pub enum Chain {
     OwnAltitude,
     /// Relays that differ in both power and altitude.
     Own,
-    /// Random choice for each link: equal relays in half of the links, each other kind in a sixth.
+    /// Random kind for each link: all relays equal with probability 1/2, every other kind with 1/6.
     Any,
 }
 
@@ -93,7 +93,8 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
 
 /// Returns `link` with added receiver noise.
 ///
-/// The noise is 1e-6 to 1e4 times the interference at a random position, within the limit of a mission.
+/// The noise is 1e-6 to 1e4 times the interference power at a random relay position, and at most as large as a mission
+/// accepts.
 pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     let place = rng.random_range(0.0..=link.distance_m);
     let altitude_m = link.relays.first().map_or(1.0, |relay| relay.altitude_m);
@@ -108,7 +109,7 @@ pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
 
 /// Returns and prints the seed of a random test.
 ///
-/// It is the environment variable `SEED`, or `default` if that is not a number.
+/// It is the environment variable `SEED`. If `SEED` is not a number, the seed is `default`.
 pub fn seed(default: u64) -> u64 {
     let seed = std::env::var("SEED")
         .ok()
@@ -120,7 +121,7 @@ pub fn seed(default: u64) -> u64 {
 
 /// Returns the number of random problems in a test.
 ///
-/// It is the environment variable `COUNT`, or `usual` if that is not a number.
+/// It is the environment variable `COUNT`. If `COUNT` is not a number, it is `usual`.
 pub fn count(usual: usize) -> usize {
     let count = std::env::var("COUNT").ok();
     count.and_then(|text| text.parse().ok()).unwrap_or(usual)

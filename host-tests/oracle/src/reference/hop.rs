@@ -74,7 +74,8 @@ impl<'a> Hop<'a> {
 
     /// Returns a value with the sign of the SIR's slope along `x`. Its zeros are the extrema of the SIR.
     ///
-    /// Beyond the sender the value is a concave function of `x` (see [`super`]), so it has at most two zeros.
+    /// For `x` greater than the sender's x, the value is a concave function of `x` (see [`super`]) and has at most two
+    /// zeros.
     fn rise(&self, x: f64) -> f64 {
         let (dx, dh) = (x - self.sender_x, self.own_h - self.sender_h);
         let (ix, iy, ih) = (x - self.link.x_i, self.link.y_i, self.own_h);
@@ -94,10 +95,10 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// Returns the x, m, of the SIR's extrema from `low` to `high`, ascending; at most two.
+    /// Returns the x, m, of the SIR's extrema from `low` to `high`, ascending.
     ///
-    /// The SIR is monotone between them. `low` must not be before the sender. The cost is about 60 evaluations of the
-    /// slope, with receiver noise about 300.
+    /// There are at most two extrema; between them the SIR is monotone. `low` must not be less than the sender's x. The
+    /// cost is about 60 evaluations of the slope, or about 300 with receiver noise.
     pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
         let (first, last) = (self.rises(low), self.rises(high));
         let sign = |from: f64, to: f64| bisect(from, to, |x| self.rises(x) == self.rises(from));
@@ -135,8 +136,8 @@ impl<'a> Hop<'a> {
 
 /// Returns the last x, m, from `inside` toward `outside` at which `holds` is still true.
 ///
-/// `outside` may be smaller than `inside`. `holds` must be true at `inside`, false at `outside`, and change once. The
-/// result is exact to adjacent f64 numbers.
+/// `outside` may be smaller than `inside`. `holds` must be true at `inside` and false at `outside`, with a single
+/// change between them. At the f64 number next to the result, toward `outside`, `holds` is false.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = inside.midpoint(outside);

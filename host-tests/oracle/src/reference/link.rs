@@ -38,9 +38,9 @@ pub struct Link {
     pub relays: Vec<Relay>,
 }
 
-/// Returns the free-space path-loss factor (4 pi f / c)^2 times an excess loss, 1/m^2.
+/// Returns a path-loss factor, 1/m^2: the free-space factor (4 pi f / c)^2 times the excess loss.
 ///
-/// `carrier_hz` > 0, `excess` >= 1 (linear).
+/// `carrier_hz` > 0 is the frequency f, `excess` >= 1 the excess loss (linear).
 pub fn path_loss_factor(carrier_hz: f64, excess: f64) -> f64 {
     const LIGHT_M_PER_S: f64 = 299_792_458.0;
     let waves = 4.0 * std::f64::consts::PI * carrier_hz / LIGHT_M_PER_S;
@@ -94,8 +94,8 @@ pub(super) fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -
 
 /// Returns true if `sir` is at least `target`, apart from rounding.
 ///
-/// With the interferer at Tx the SIR is constant and can equal the target; rounding would decide without this
-/// tolerance.
+/// With the interferer at Tx, the SIR of the first hop is constant and can be equal to the target. Without a tolerance
+/// for rounding errors the result would then be arbitrary.
 pub(super) fn meets(sir: f64, target: f64) -> bool {
     sir >= target * (1.0 - 4.0 * f64::EPSILON)
 }

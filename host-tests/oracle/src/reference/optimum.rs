@@ -11,9 +11,9 @@ const LEAST_TARGET: f64 = 1e-250;
 impl Link {
     /// Returns the best SIR (linear) of all chains: the largest target SIR that a chain meets.
     ///
-    /// Accurate to 1e-13 relative. `None` without relays, or if every chain has an SIR of zero. About 50 to 60 targets
-    /// are tried. If all relays share one altitude, only the chain with every relay as near to Rx as possible is tried.
-    /// Otherwise all positions of each relay are considered.
+    /// The relative error is at most 1e-13. `None` without relays, or if every chain has an SIR of zero. About 50 to 60
+    /// targets are tried. If all relays share one altitude, it suffices to try the chain with every relay as near to Rx
+    /// as possible. Otherwise all possible positions of the relays are computed.
     pub fn optimum(&self) -> Option<f64> {
         let mut heights = self.relays.iter().map(|relay| relay.altitude_m);
         let first = heights.next()?;
@@ -26,9 +26,9 @@ impl Link {
 
     /// Returns the largest target SIR (linear) that a bisection with [`Link::feasible`] finds.
     ///
-    /// Accurate to 1e-13 relative. If all relays share one altitude, it is the optimum. Otherwise it may be lower,
-    /// because the greedy chain can miss one target and meet a larger one. `None` without relays, or if every chain has
-    /// an SIR of zero.
+    /// The relative error is at most 1e-13. If all relays share one altitude, the result is the optimum. Otherwise it
+    /// may be lower, because the greedy chain may miss a target although it meets a larger target. `None` without
+    /// relays, or if every chain has an SIR of zero.
     pub fn farthest_optimum(&self) -> Option<f64> {
         self.largest_target(|target| self.feasible(target).is_some())
     }
@@ -57,9 +57,9 @@ impl Link {
 
     /// Returns the first target SIR (linear) of the paper's fixed-step search.
     ///
-    /// It is the smaller of two SIRs: of the first hop with relay 1 straight above Tx, and of the last hop with relay N
-    /// straight above Rx. If the interferer is behind Tx (x below 0), the first SIR is instead the largest one of the
-    /// first hop.
+    /// It is the smaller one of two SIRs: the SIR of the first hop with relay 1 straight above Tx, and the SIR of the
+    /// last hop with relay N straight above Rx. If the interferer's x is below 0, the largest SIR of the first hop
+    /// replaces the former.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {
@@ -73,11 +73,11 @@ impl Link {
     /// Runs the paper's fixed-step search: lowers the target SIR by `epsilon` until a chain meets it.
     ///
     /// Returns the number of targets tried and the last target (linear). `None` if no target can be met. `epsilon` is
-    /// linear, above 0. Each target costs one chain.
+    /// linear, above 0. For each target one chain is computed.
     ///
-    /// The first target is the smaller of two SIRs: of the first hop with relay 1 straight above Tx, and of the last
-    /// hop with relay N straight above Rx. If the interferer is behind Tx (x below 0), the first SIR is instead the
-    /// largest one of the first hop.
+    /// The first target is the smaller one of two SIRs: the SIR of the first hop with relay 1 straight above Tx, and
+    /// the SIR of the last hop with relay N straight above Rx. If the interferer's x is below 0, the largest SIR of the
+    /// first hop replaces the former.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

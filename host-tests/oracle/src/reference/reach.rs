@@ -30,10 +30,10 @@ impl Link {
         None
     }
 
-    /// Returns the largest distance from Rx, m, at which the last relay meets the SIR `target` at Rx.
+    /// Returns the largest distance of the last relay from Rx, m, at which the SIR at Rx meets `target`.
     ///
-    /// `target` is linear. The distance may exceed that from Tx to Rx. `None` if the target is missed even above Rx, or
-    /// is not positive. The cost is about 60 evaluations of the SIR.
+    /// `target` is linear. The result may be larger than the distance from Tx to Rx. `None` if `target` is not
+    /// positive, or not met even with the relay straight above Rx. The cost is about 60 evaluations of the SIR.
     pub fn rx_reach(&self, target: f64) -> Option<f64> {
         let sir = |distance: f64| self.sir_rx(self.distance_m - distance);
         let meets = |distance: f64| sir(distance).is_some_and(|sir| meets(sir, target));
@@ -49,9 +49,9 @@ impl Link {
 
     /// Returns the positions, m, of the greedy chain: each relay is as far toward Rx as `target` allows.
     ///
-    /// `target` is a linear SIR. `None` if a relay has no position that meets it, or if the last relay misses it at Rx.
-    /// Relays use the same method in flight. If all relays share one altitude, `None` proves that no chain meets the
-    /// target. For other chains [`Link::placement`] gives this proof. The cost is N calls of [`Link::farthest`].
+    /// `target` is a linear SIR. `None` if a relay or Rx cannot meet it. If all relays share one altitude, `None`
+    /// proves that no chain meets `target`. For other chains [`Link::placement`] gives this proof. Relays use the same
+    /// method in flight. The cost is N calls of [`Link::farthest`].
     pub fn feasible(&self, target: f64) -> Option<Vec<f64>> {
         let mut from = 0.0;
         let mut x = Vec::with_capacity(self.len());

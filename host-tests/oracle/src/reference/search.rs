@@ -2,7 +2,9 @@
 
 use super::link::Link;
 
-/// Number of golden-section steps in a grid cell. They shrink the cell to about 2e-9 of its width.
+/// Number of golden-section steps in a cell of the grid.
+///
+/// These steps shrink the searched interval to about 2e-9 of the cell's width.
 const STEPS: usize = 42;
 
 const PEAKS: usize = 4;
@@ -10,10 +12,9 @@ const PEAKS: usize = 4;
 impl Link {
     /// Returns the best SIR (linear) of all chains that keep the minimum separation, by brute force.
     ///
-    /// The search tries a grid of positions for each relay, and refines the best ones. `points` (>= 16) is the number
-    /// of grid points per relay. The result is 0 if there is no such chain. It may be below the optimum, because the
-    /// grid may miss it, but is never above it, except for rounding. The cost is about (4 `points` + 170)^N SIR
-    /// evaluations: use it for N of 1 or 2.
+    /// The search tries `points` (>= 16) positions for each relay, and refines the best ones. Returns 0 if there is no
+    /// such chain. The result may be below the optimum, because the search may miss it, but never above it, except for
+    /// rounding. The cost is about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.
     pub fn optimum_by_search(&self, points: u32) -> f64 {
         self.best_from(1, 0.0, points)
     }
@@ -37,7 +38,8 @@ impl Link {
 
     /// Returns the x from `from_x` to Rx, m, that the search tries for a relay.
     ///
-    /// About `points` of them are evenly spaced. Others get denser toward `from_x`, Rx and the interferer.
+    /// About `points` of them are evenly spaced. The others are denser the closer they are to `from_x`, Rx or the
+    /// interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);

@@ -17,8 +17,8 @@ impl Link {
     /// Returns the positions, m, of a chain that meets `target` (linear SIR).
     ///
     /// Each relay is as far toward Rx as possible. The altitudes of the relays may differ. `None` proves that no chain
-    /// meets the target. The possible positions of a relay are seldom more than three intervals; each costs about 300
-    /// SIR evaluations.
+    /// meets the target. The possible positions of a relay are intervals, seldom more than three. The cost is about 300
+    /// SIR evaluations for each interval.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let sets = self.sets(target, 0.0)?;
         let mut limit = self.distance_m;
@@ -31,10 +31,10 @@ impl Link {
         Some(x)
     }
 
-    /// Returns the best SIR (linear) of all chains that keep the minimum separation.
+    /// Returns the best SIR (linear) of all chains that keep the minimum separation, at fixed altitudes.
     ///
-    /// The altitudes are fixed. Accurate to 1e-13 relative. `None` without relays, if every chain has an SIR of zero,
-    /// or if no chain keeps the minimum separation.
+    /// The relative error is at most 1e-13. `None` without relays, if no chain has an SIR above zero, or if no chain
+    /// keeps the minimum separation.
     pub fn optimum_apart(&self) -> Option<f64> {
         self.largest_target(|target| self.sets(target, self.min_separation_m).is_some())
     }
@@ -50,9 +50,9 @@ impl Link {
         })
     }
 
-    /// Returns the positions of each relay at which its hop and all earlier hops can meet `target`.
+    /// Returns for each relay the positions at which the hops from Tx to this relay can meet `target`.
     ///
-    /// Neighbours are at least `apart_m` apart. `None` if no chain meets the target at Rx.
+    /// Relays k-1 and k are at least `apart_m` apart. `None` if no chain meets the target at Rx.
     fn sets(&self, target: f64, apart_m: f64) -> Option<Vec<Vec<Interval>>> {
         let first = Hop::new(self, 1, 0.0)?;
         let turns = first.turns(0.0, self.distance_m);
@@ -107,8 +107,8 @@ impl Link {
 
 /// Returns the parts of the interval `low` to `high` in which `holds` returns true.
 ///
-/// `turns` are positions in ascending order. `holds` must change at most once between two neighbours of the list `low`,
-/// `turns`, `high`.
+/// `turns` are positions in ascending order, which divide the interval. In each part of the divided interval, `holds`
+/// must change at most once.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
     let corners = || turns.iter().copied().chain([high]);
     let froms = std::iter::once(low).chain(turns.iter().copied());

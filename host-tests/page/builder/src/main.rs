@@ -25,9 +25,10 @@ const SCRIPTS: [&str; 7] = [
     "page.js",
 ];
 
-/// Options of the run that the page shows first. The page's script `wish.js` has the same options.
+/// Options of the run that the page shows first.
 ///
-/// The result of this run is embedded in the page, so that it is visible before the WebAssembly code is loaded.
+/// They must be the same as those that the page's script `wish.js` begins with. The result of the run is embedded in
+/// the page, so that the result is visible before the WebAssembly code is loaded.
 const FIRST_OPTIONS: &str = "--uavs 8 --method align";
 const FIRST_SCENARIO: &str = "[geometry]
 distance_m = 1000.0

@@ -22,7 +22,9 @@ pub fn numbered(number: u32) -> Scenario {
     in_space(&mut rng, &(1..=100)).as_relays_know_it()
 }
 
-/// Returns the optimum SIR (linear) of each scenario by number; 0 if no chain is possible.
+/// Returns the best SIR (linear) of each stored scenario, in the order of the scenarios' numbers.
+///
+/// The SIR is 0 if no chain is possible in the scenario.
 ///
 /// # Errors
 /// If the file cannot be read, or if a row is not a scenario's number and an SIR.

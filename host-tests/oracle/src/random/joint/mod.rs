@@ -48,7 +48,8 @@ use uav_relay_scenario::number::narrow;
 
 /// Random link, and the corridor in which its relays choose positions.
 ///
-/// The corridor limits altitude and lateral position. In the link all relays are at the lowest altitude.
+/// The corridor limits altitude and lateral position. Before the choice, all relays of the link have the lowest
+/// altitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Chain of relays with Tx, Rx and interferer.
@@ -87,7 +88,7 @@ impl Scenario {
 /// The equal spacing of N relays is D / (N + 1); D is the distance from Tx to Rx.
 pub const ROOMY: (f64, f64) = (0.01, 0.1);
 
-/// Range of minimum separations that often limit a chain, as fractions of the equal spacing.
+/// Range of minimum separations that limit more chains than [`ROOMY`], as fractions of equal spacing.
 ///
 /// The equal spacing of N relays is D / (N + 1); D is the distance from Tx to Rx. In about a tenth of these scenarios
 /// the minimum separation lowers the optimum SIR.
@@ -165,9 +166,9 @@ pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     drawn
 }
 
-/// Returns the scenario with relays that differ, as in the module's last table.
+/// Returns the scenario with different relays, by the last table of this module's documentation.
 ///
-/// Some relays get their own power. For some relays the lateral position and altitude are fixed.
+/// In some scenarios some relays get another power, in some the lateral position and altitude of some relays are fixed.
 #[must_use]
 pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
     let (powers, holds): (bool, bool) = (rng.random(), rng.random());
@@ -200,7 +201,7 @@ fn count(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> u32 {
         .unwrap_or(fewest)
 }
 
-/// Draws the interferer's x as a fraction of the distance from Tx to Rx.
+/// Draws the interferer's x as a fraction of the distance from Tx to Rx: from -1 to 2, mostly 0 to 1.
 fn along(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..40) {
         0..32 => rng.random_range(0.0..=1.0),

@@ -6,13 +6,13 @@ use crate::reference::link::Relay;
 /// Chain of relays built from Rx back toward Tx, and the target SIR that it meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backward {
-    /// Target SIR (linear). Every hop but the first is as long as the target allows.
+    /// Target SIR (linear). All hops except the first hop, from Tx, are as long as the target allows.
     pub gamma: f64,
     /// Positions of the relays from Tx to Rx, m.
     pub places: Vec<f64>,
-    /// Number of target SIRs tried, with the last one.
+    /// Number of target SIRs tried, including the successful one.
     ///
-    /// [`StochasticLink::fewest`] returns the number of relays here.
+    /// In a result of [`StochasticLink::fewest`] it is the number of relays instead.
     pub iterations: usize,
 }
 
@@ -29,8 +29,8 @@ impl StochasticLink {
 
     /// Returns the positions, m, of the chain built from Rx back to Tx for the target SIR `gamma`.
     ///
-    /// Every hop but the first is as long as `gamma` allows; no relay is before Tx. `None` if even the shortest hop
-    /// misses the target.
+    /// All hops except the first hop, from Tx, are as long as `gamma` allows. No relay has an x below 0. `None` if even
+    /// the shortest possible hop misses `gamma`.
     pub fn backward(&self, gamma: f64) -> Option<Vec<f64>> {
         let tail = self.relays.last()?;
         let d = self.distance_m;
@@ -53,9 +53,9 @@ impl StochasticLink {
         Some(places)
     }
 
-    /// Returns the expected SIR of the first hop in the chain built backward for `gamma`, at most `gamma`.
+    /// Returns the smaller one of `gamma` and the expected SIR of the first hop, from Tx.
     ///
-    /// 0 if there is no chain.
+    /// The chain is the one of [`StochasticLink::backward`] for `gamma`. Returns 0 if there is no such chain.
     pub fn backward_sir(&self, gamma: f64) -> f64 {
         self.backward(gamma)
             .and_then(|places| self.hop_sirs(&places).first().map(|sir| sir.min(gamma)))
@@ -64,9 +64,9 @@ impl StochasticLink {
 
     /// Runs the paper's Algorithm 4: lowers the target SIR by `step` until the first hop meets it.
     ///
-    /// The first target is [`StochasticLink::ceiling`]. Unlike in the printed algorithm, the length of the last hop
-    /// depends on the target, and no relay is before Tx. `None` if no target above 0 is met, for example because `step`
-    /// is larger than the optimum.
+    /// The first hop is the one from Tx. The first target is [`StochasticLink::ceiling`]. Unlike in the printed
+    /// algorithm, the length of the last hop depends on the target, and no relay has an x below 0. `None` if no target
+    /// above 0 is met, for example because `step` is larger than the optimum.
     pub fn algorithm4(&self, step: f64) -> Option<Backward> {
         let mut gamma = self.ceiling();
         let mut iterations = 1;
@@ -89,9 +89,9 @@ impl StochasticLink {
 
     /// Returns the largest value of [`StochasticLink::backward_sir`] that a search over targets finds.
     ///
-    /// The search tries `points` targets from the ceiling down to 1e-8 of it, evenly spaced in their logarithm. Then it
-    /// tries four times as many around the best one. Use it if the SIR has several maxima over the target. It can miss
-    /// a maximum that is narrower than the spacing.
+    /// The search tries about `points` targets from the ceiling down to 1e-8 of it, evenly spaced in their logarithm.
+    /// Four further rounds of `points` targets refine the best one. It is useful if the SIR has several maxima over the
+    /// target, but may miss a maximum that is narrower than the spacing.
     pub fn backward_best(&self, points: u32) -> f64 {
         let (mut low, mut high) = (1e-8_f64.ln(), 0.0);
         let mut best = (0.0, 0.0);
@@ -109,10 +109,10 @@ impl StochasticLink {
         best.1
     }
 
-    /// Solves the paper's problem 1: the smallest number of relays whose backward chain meets `gamma`.
+    /// Solves the paper's problem 1: the fewest relays whose chain built backward from Rx meets `gamma`.
     ///
     /// All relays have the power and altitude of the first relay. `None` if more than `most` relays are needed, or if
-    /// the target cannot be met. The result's `iterations` is the number of relays.
+    /// the target cannot be met. The field `iterations` of the result is the number of relays.
     pub fn fewest(&self, gamma: f64, most: usize) -> Option<Backward> {
         let like: Relay = *self.relays.first()?;
         (1..=most).find_map(|n| {

@@ -5,10 +5,9 @@ use super::link::StochasticLink;
 impl StochasticLink {
     /// Returns the best expected SIR (linear) of equal relays if the interference is the same everywhere.
     ///
-    /// All hops then have the same SIR, and together span the distance from Tx to Rx. The result is at most the SIR of
-    /// a first hop right above Tx, and of a last hop from right above Rx. At most about 2000 evaluations.
-    ///
-    /// `None` without relays, if the relays differ, or if Upsilon differs in the table.
+    /// All hops then have the same SIR, and together span the distance from Tx to Rx. The SIR is limited by the first
+    /// hop with its relay above Tx, and by the last hop with its relay above Rx. The cost is at most about 2000
+    /// evaluations. `None` without relays, if the relays differ, or if the table `upsilon` has different values.
     pub fn iid_optimum(&self) -> Option<f64> {
         let (first, (_, u)) = (self.relays.first()?, *self.upsilon.first()?);
         let alike = self.relays.iter().all(|relay| relay == first)

@@ -15,10 +15,10 @@ pub struct StochasticLink {
     pub mu_los: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Table of Upsilon along the line Tx-Rx: ascending x, m, each with Upsilon, 1/W.
+    /// Table of Upsilon on the line Tx-Rx: pairs of x, m, in ascending order, and Upsilon(x), 1/W.
     ///
-    /// Upsilon = E[1/I], with the interference power I. It is linear between two x of the table, and constant beyond
-    /// the first and the last.
+    /// Upsilon = E[1/I], with the interference power I. It is linear between two x of the table, and constant below the
+    /// first x and above the last.
     pub upsilon: Vec<(f64, f64)>,
     /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,

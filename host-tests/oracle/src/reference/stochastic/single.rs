@@ -7,7 +7,7 @@ use super::link::StochasticLink;
 pub struct Single {
     /// Position of the relay along the line from Tx, m.
     pub x_m: f64,
-    /// Smaller of two SIRs, linear: the target SIR and the first hop's expected SIR.
+    /// SIR (linear): the target SIR, or the first hop's expected SIR if this is smaller.
     pub sir: f64,
     /// Number of target SIRs tried.
     pub iterations: usize,
@@ -16,25 +16,26 @@ pub struct Single {
 impl StochasticLink {
     /// Runs Algorithm 3 as printed: it stops at the first target SIR that the first hop meets.
     ///
-    /// The targets fall by `step` from the largest SIR of the second hop. If the first hop meets no target, the result
-    /// is the best position tried. `None` unless the link has exactly one relay.
+    /// The first target is the largest SIR of the second hop; each further one is lower by `step`. If the first hop
+    /// meets no target, the result is the best position tried. `None` unless the link has exactly one relay.
     pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
         self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
     }
 
-    /// Runs the corrected Algorithm 3: it continues as long as a lower target SIR can be better.
+    /// Runs the corrected Algorithm 3: it stops when no lower target SIR can give a better position.
     ///
-    /// Returns the best position tried. If the interference is the same everywhere, this can be one step from the
-    /// printed algorithm's position; its SIR is at least as high. `None` unless the link has exactly one relay.
+    /// Returns the best position tried. In even interference it can belong to a target one `step` away from that of the
+    /// printed algorithm; its SIR is at least as high. `None` unless the link has exactly one relay.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
             (best.sir >= gamma - step).then_some(best)
         })
     }
 
-    /// Lowers the target SIR by `step` until `end` returns a result, and returns this result.
+    /// Lowers the target SIR by `step` until the closure `end` returns `Some`, and returns its value.
     ///
-    /// The arguments of `end` are the relay's position for this target, the best position so far, and the target.
+    /// The arguments of `end` are the relay's position for this target, the best position so far, and the target. If
+    /// `end` never returns `Some`, the result is the best position.
     fn descend(
         &self,
         step: f64,
@@ -70,8 +71,8 @@ impl StochasticLink {
 
     /// Returns the best position, m, and its expected SIR (linear) for one relay, by brute force.
     ///
-    /// It tries `points` positions between each two neighbouring positions of the interference table, and refines the
-    /// search four times. `None` unless the link has exactly one relay.
+    /// In each interval of the interference table it tries about `points` positions, and refines the best one four
+    /// times. `None` unless the link has exactly one relay.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
         let [_] = self.relays.as_slice() else {
             return None;

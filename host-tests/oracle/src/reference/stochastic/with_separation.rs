@@ -30,9 +30,9 @@ fn joined(mut all: Stretches) -> Stretches {
 impl StochasticLink {
     /// Returns the best expected SIR (linear) of all chains with relays at least `apart_m` apart.
     ///
-    /// It computes the set of all possible positions of each relay, from Rx back to Tx. A set consists of intervals: as
-    /// the receiver of a hop moves along an interval, the possible positions of its sender move, too. Relays need not
-    /// go as far as possible, so no chain is left out. 0 if no chain is possible.
+    /// It computes all possible positions of each relay from those of the next relay, beginning at Rx. The positions
+    /// form intervals. All of them are kept, not only those farthest from Rx, so that no chain is missed. Returns 0 if
+    /// no chain is possible.
     pub fn best_apart(&self, apart_m: f64) -> f64 {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return 0.0;

@@ -13,7 +13,9 @@ use tungstenite::{Message, WebSocket};
 /// Longest wait for a condition on the page, chosen so that slow machines pass.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Returns the code of axe-core, which finds faults of accessibility. The environment variable AXE names another copy.
+/// Returns the code of axe-core, which finds faults of accessibility.
+///
+/// The code comes from the file that the environment variable AXE names, or else from the Python package of axe-core.
 fn axe() -> String {
     if let Ok(file) = std::env::var("AXE") {
         return std::fs::read_to_string(file).unwrap();
@@ -200,7 +202,9 @@ impl Browser {
         tree["nodes"].as_array().unwrap().clone()
     }
 
-    /// Checks the page by all rules of axe-core. `what` describes the page.
+    /// Checks the page by all rules of axe-core.
+    ///
+    /// `what` describes the tested page in the message of a failed check.
     pub(crate) fn passes_axe(&mut self, what: &str) {
         self.run(&axe());
         let faults = self.value(

@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 use super::chromium::Browser;
 use super::opened::{address, choose, number, opened, press, root, settled};
 
-/// JavaScript that lists the faulty labels in the page's pictures: overlapping, or beyond the picture.
+/// JavaScript that lists the faulty labels of the page's SVG pictures.
+///
+/// A label is faulty if it overlaps another label, or sticks out of its picture.
 const CLASHES: &str = "(() => { const clashes = []; \
     for (const svg of document.querySelectorAll('svg')) { \
       const out = svg.getBoundingClientRect(); \
@@ -145,7 +147,7 @@ fn median(mut all: Vec<f64>) -> f64 {
 
 /// Returns the median computing time, ms, of `times` simulation runs without a recording.
 ///
-/// The page makes such a run while the user drags a symbol.
+/// The page simulates without a recording while the user drags a symbol.
 fn took(browser: &mut Browser, times: u32) -> f64 {
     let all = (0..times).map(|_| {
         let runs = number(browser, "window.last.runs");

@@ -33,11 +33,13 @@ pub(crate) fn opened(width: u32, height: u32) -> Browser {
     browser
 }
 
-/// JavaScript condition: the last run matches the input and is recorded, and no run is pending.
+/// JavaScript condition: the last simulation run is for the present input, and no run is pending.
+///
+/// The user must not be dragging a symbol, because a run during a drag has no recording.
 const SETTLED: &str = "!engine.running && !engine.next && !hand.holds && window.last.toml === scenario() \
     && window.last.words === options() && window.last.runs > 1";
 
-/// Waits until the page has no run pending, then moves the playback to the end of the recording.
+/// Waits until the page has no simulation run pending, then moves the playback to its end.
 pub(crate) fn settled(browser: &mut Browser) {
     browser.until(SETTLED);
     browser.run("player.stop(); player.seek(Math.max(0, player.ticks.length - 1))");
@@ -103,10 +105,9 @@ fn native(browser: &mut Browser) -> String {
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
-/// Returns the part `report` of `told`, the JSON result of a run in the page.
+/// Returns the member `report` of the JSON text `told`, the result of a simulation run in the page.
 ///
-/// The text of the report is not changed, so that a test can compare it with the report of `cargo chain` byte by
-/// byte.
+/// The text of the report is not changed, so that a test can compare it with the report of `cargo chain` byte by byte.
 pub(crate) fn report(told: &str) -> &str {
     let report = told.strip_prefix("{\"report\":").unwrap();
     let end = report.find(",\"film\":{\"stands\":").unwrap();
@@ -147,8 +148,9 @@ fn the_numbers_are_those_of_the_command_to_the_bit() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks the percentage that the page states: the chain's SIR as a part of the best possible SIR. The best possible
-/// SIR must be that of the five relays that are switched on, without the sixth.
+/// Checks the percentage that the page states: the chain's SIR divided by the best possible SIR.
+///
+/// One of six relays is switched off. The best possible SIR must be that of five relays.
 #[test]
 fn a_relay_that_is_off_does_not_count_in_the_share_of_the_optimum() {
     let mut browser = opened(1280, 900);

@@ -7,7 +7,7 @@ use crate::opened::{choose, middle, number, opened, press, said, settled};
 
 /// Returns the playback steps (ticks) of the page as JSON objects.
 ///
-/// Each object has the time in s, the sender of a frame, the lowest SIR of a hop, the number of hops, the relays that
+/// Each object has the time in s, the sender of a frame, the SIR of the worst hop, the number of hops, the relays that
 /// are off, and the number of relays with a position.
 fn ticks(browser: &mut Browser) -> Vec<Value> {
     let ticks = browser.value(

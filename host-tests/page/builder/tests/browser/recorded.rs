@@ -12,7 +12,9 @@ use uav_relay_sim::simulator::setup::Setup;
 use super::chromium::Browser;
 use super::opened::number;
 
-/// Records a simulated flight in `folder`, and returns its page and the drones' positions at the end.
+/// Records a simulated flight in `folder`; returns its replay page and the drones' final positions.
+///
+/// `words` are further options of `cargo chain`.
 fn recorded(folder: &Path, words: &str) -> (String, Vec<[f64; 2]>) {
     let words = format!("chain --fly --watch tx {words}");
     let options = Options::try_parse_from(words.split_whitespace()).unwrap();

@@ -55,7 +55,9 @@ impl Shown {
         }
     }
 
-    /// Shows a simulated flight with these options of `cargo chain`, `speed` times faster than real time.
+    /// Shows a simulated flight, `speed` times faster than real time.
+    ///
+    /// `words` are options of `cargo chain` for the flight.
     fn flight(words: &'static str, speed: u64) -> Self {
         let mut now = uav_relay::Instant::ZERO;
         let words = format!("chain --fly --web 127.0.0.1:0 {words}");
@@ -259,7 +261,9 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// JavaScript that returns the opacity, 0 to 1, of a relay's symbol, from colours at its upper edge.
+/// JavaScript function that returns the opacity, 0 to 1, of a relay's symbol on the map.
+///
+/// It computes the opacity from the colour of a pixel near the upper edge of the symbol.
 const OPACITY: &str = "(number) => { map.draw(); const { position } = map.snapshot.relays.find((it) => it.number === number); \
     const [x, y] = map.pixels(position.x_m, position.y_m); const part = (colour) => parseInt(colour.slice(1, 3), 16); \
     const red = map.pen.getImageData(Math.round(x), Math.round(y) - 7, 1, 1).data[0]; \
@@ -461,7 +465,10 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
 }
 
-/// Checks that the button of a lost relay's alarm sends one request after 1 s, and shows a refusal.
+/// Checks the button that clears a lost relay, in the relay's alarm.
+///
+/// If the button is held for 1 s, the page must send one request. If the request is refused, the page must show the
+/// refusal.
 #[test]
 fn a_lost_relay_is_cleared_by_a_button_that_is_held() {
     let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None, None).unwrap();
@@ -687,7 +694,7 @@ fn png([red, green, blue]: [u8; 3]) -> Vec<u8> {
 /// Colours of the map tiles, red, green and blue. Neighbouring tiles have different colours.
 const TILE_COLOURS: [[u8; 3]; 2] = [[200, 220, 170], [235, 215, 190]];
 
-/// Returns the line of a chain on earth of 2 km, to the north-east.
+/// Returns the line from Tx to Rx on earth for a test chain: 2 km long, to the north-east.
 fn line() -> Axis {
     let site = |lat_e7, lon_e7| Geodetic {
         lat_e7,
@@ -957,7 +964,9 @@ fn first_paint(browser: &mut Browser, url: &str) -> f64 {
 
 #[test]
 fn the_first_paint_comes_within_a_tenth_of_a_second() {
-    /// Maximum number of loads. Several are tried, because other programs of the machine slow single loads down.
+    /// Maximum number of times that the page is loaded.
+    ///
+    /// Several loads are measured, because other programs on the machine make some of them slow.
     const LOADS: usize = 200;
     let shown = shown_full(100);
     let mut browser = Browser::start("about:blank", 1920, 1080);
@@ -1057,9 +1066,9 @@ fn the_screen_can_be_heard_and_used_by_keyboard() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// JavaScript that returns the texts with a contrast ratio below 4.5, the limit of WCAG 2.1 AA.
+/// JavaScript that returns the page's texts with a contrast ratio below 4.5.
 ///
-/// Texts of disabled buttons and of the canvas are left out.
+/// WCAG 2.1 AA requires 4.5. Texts of disabled buttons and of the canvas are left out.
 const FAINT: &str = r"(() => {
   const linear = (part) => (part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4);
   const parts = (colour) => colour.match(/[\d.]+/g).map(Number);
