@@ -49,7 +49,7 @@ pub(crate) fn resume_views(
     Ok((StoredFile::new(VIEWS, file, stored)?, stored.is_some()))
 }
 
-/// Restores into `relay` the mission that was uploaded before this start; returns true if there was one.
+/// Restores into `relay` the mission uploaded before this start; returns true if there was one.
 ///
 /// `mission` is the mission of the relay's options, on which the upload is based.
 ///

@@ -536,7 +536,7 @@ impl Uploading {
     }
 }
 
-/// Returns a name of a mission for the page: its version, and the digest of its upload, if it was uploaded.
+/// Returns a name of a mission for the page: its version, and the digest of its upload if there is one.
 ///
 /// The page sends this name back with its requests.
 pub(crate) fn name_of(version: u16, upload: Option<&Upload>) -> String {

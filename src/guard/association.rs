@@ -382,9 +382,10 @@ impl KeepOut {
         }
     }
 
-    /// Returns true if the new neighbour `node` at `x_m` is on the wrong side of a lost drone along x, by more than the
-    /// errors of the reports. The number of `node` is between that of this relay and that of the lost drone, so its x
-    /// has to be between them, too. The new neighbour knows nothing of the lost drone.
+    /// Returns true if the new neighbour `node` at `x_m` is on the wrong side of a lost drone along x.
+    ///
+    /// The number of `node` is between that of this relay and that of the lost drone, so its x has to be between them,
+    /// too, up to the errors of the reports. The new neighbour knows nothing of the lost drone.
     pub(super) fn bars(&self, side: Side, node: u16, x_m: f32, config: &GuardConfig) -> bool {
         let (known, lost_m) = self.known;
         let off_m = 2.0 * config.hover_m + config.rounding();
@@ -435,8 +436,9 @@ impl KeepOut {
         self
     }
 
-    /// Returns the reason why a neighbour without an association (session) stops this relay: `Lost` beside a lost
-    /// drone, which the neighbour may have to pass, otherwise `Unheard`.
+    /// Returns the reason why a neighbour without an association (session) stops this relay.
+    ///
+    /// It is `Lost` beside a lost drone, which the neighbour may have to pass, otherwise `Unheard`.
     pub(super) const fn unpaired_reason(&self) -> HoldReason {
         if self.lost.is_some() {
             HoldReason::Lost

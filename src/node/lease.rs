@@ -108,8 +108,9 @@ struct Departures {
     /// Relay that requests to leave (0 for none), and the time of its first request. The request may be from an earlier
     /// view.
     leaver: (u16, Instant),
-    /// Time of the first agreement on positions in this view, or the last time at which two renewals in a row reported
-    /// all relays in place. As seen by the leader.
+    /// Time of the first agreement in this view, or since then the last time at which all were in place.
+    ///
+    /// All are in place if two renewals in a row report it. The time is that of the leader.
     settled_at: Instant,
     /// Time at which this view's first renewal turned at the last relay; `None` until it has completed.
     turned_at: Option<Instant>,

@@ -43,7 +43,7 @@ struct Motion {
 pub(crate) enum Begin {
     /// The start time.
     At(Instant),
-    /// Not known yet: the motion begins at this time if the start time remains unknown.
+    /// Latest start time: the motion begins at this time if the common start time remains unknown.
     By(Instant),
 }
 

@@ -385,7 +385,7 @@ impl Radio {
 }
 
 impl Heard {
-    /// Records that the neighbour's drone flies, or that its chain has agreed on positions, if a message shows it.
+    /// Records what a message shows: the neighbour's drone flies, or its chain has agreed on positions.
     fn observe(&mut self, content: &Content) {
         let Content::Message(message) = content else {
             return;

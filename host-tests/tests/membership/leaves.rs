@@ -287,6 +287,69 @@ fn a_departure_ends_well_if_the_relay_stays_or_dies() {
     }
 }
 
+/// Checks that the chain recovers as after a loss if the relay that leaves, or its spare, dies during the replacement.
+///
+/// The environment variable `COUNT` has the number of random moments. Two losses in a row are longer than one: the death
+/// may be found only after the next view change. If the proposal of the dying relay is decided by a spare that alone
+/// accepts it, the others wait for the longest lease.
+#[test]
+fn a_sudden_death_during_a_replacement_is_an_ordinary_loss() {
+    let mut all_s = Vec::new();
+    for seed in 1..=count(40) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let leaver = rng.random_range(1..=9);
+        let spare = (leaver + rng.random_range(0..8)) % 9 + 1;
+        let mut setup = departing(9, &[(leaver, None)]);
+        setup.seed = seed;
+        setup.spares = vec![spare];
+        let dead = if rng.random_bool(0.5) { leaver } else { spare };
+        let at_ms = 1_000 * AT_S + rng.random_range(0..60_000);
+        setup.kills = vec![(dead, Instant::from_millis(at_ms))];
+        let name = format!("SEED={seed}: {spare} for {leaver}, {dead} dies at {at_ms} ms");
+        let outcome = run(setup.clone()).unwrap();
+        let is_free = freed(&outcome, leaver).is_some();
+        // A spare that is called no more waits outside.
+        let is_outside = |relay: u16| {
+            relay == dead
+                || relay == leaver && is_free
+                || relay == spare && !outcome.relays[usize::from(spare) - 1].observed.leased
+        };
+        let left: Vec<u16> = (1..=9).filter(|relay| !is_outside(*relay)).collect();
+        assert!(left.len() >= 7, "{name}: {left:?}");
+        judge(&setup, &outcome, &left).unwrap_or_else(|what| panic!("{name}: {what}"));
+        let mut longest_s = 0.0_f64;
+        for relay in left {
+            let lapses = times(&outcome, relay, |what| what == TimelineEvent::LeaseLapsed);
+            let agreed = times(&outcome, relay, |what| what == TimelineEvent::Converged);
+            for lapse in lapses {
+                let again = agreed.iter().find(|at| **at > lapse);
+                let took_s = again.map_or(f64::INFINITY, |at| at - lapse);
+                longest_s = longest_s.max(took_s);
+            }
+        }
+        if longest_s > 12.0 {
+            println!("{name}: a relay is without a lease for {longest_s:.1} s");
+        }
+        all_s.push(longest_s);
+    }
+    all_s.sort_by(f64::total_cmp);
+    let share = |above_s: f64| {
+        let above = all_s.iter().filter(|took_s| **took_s > above_s).count();
+        above as f64 / all_s.len() as f64
+    };
+    let most_s = all_s[all_s.len() - 1];
+    println!(
+        "of {} deaths {:.1} % end a lease, {:.1} % for longer than 12 s, {:.1} % for longer than 25 s, at most {most_s:.1} s",
+        all_s.len(),
+        100.0 * share(0.0),
+        100.0 * share(12.0),
+        100.0 * share(25.0),
+    );
+    // As after any loss: a relay at an end searches for `lost` less `quiet`.
+    assert!(share(12.0) <= 0.04 && share(25.0) <= 0.005);
+    assert!(most_s < 8.0 * 15.0 + 12.0);
+}
+
 /// Checks that a relay may leave in the end although frames are lost and damaged.
 #[test]
 fn departures_survive_a_bad_channel() {

@@ -55,6 +55,11 @@ fn views(outcome: &Outcome, relay: u16) -> usize {
         .count()
 }
 
+/// Returns the number of random cases: the environment variable `COUNT`, or else `usual`.
+fn count(usual: u64) -> u64 {
+    std::env::var("COUNT").map_or(usual, |text| text.parse().unwrap())
+}
+
 fn ms(span: Duration) -> u64 {
     span.as_micros() / 1_000
 }

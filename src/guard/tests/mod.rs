@@ -194,8 +194,9 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// Checks rule 9: a relay that joins beside a lost drone holds its position if it is on the wrong side of this drone
-/// along x. Otherwise it could fly through the drone, of which it knows nothing.
+/// Checks rule 9: a relay that joins on the wrong side of a lost drone holds its position.
+///
+/// Otherwise it could fly through the drone, of which it knows nothing.
 #[test]
 fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
     // Relay 3 is lost at 300 m: relay 2 joins between relay 1 and it.

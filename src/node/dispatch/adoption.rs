@@ -17,8 +17,9 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
 
-/// Longest time for which a motion waits until the common start time is known, in addition to the time from the turn
-/// of a lease renewal to this start time.
+/// Longest time for which a motion waits until the common start time is known.
+///
+/// The time from the turn of a lease renewal to this start time is added.
 const WAIT: Duration = Duration::from_millis(15_000);
 
 impl Node {

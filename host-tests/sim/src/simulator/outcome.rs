@@ -115,7 +115,7 @@ pub struct Moment {
 /// Reason for the end of a simulated run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Ending {
-    /// All relays of the chain have positions, computed for the same target SIR.
+    /// The relays of the chain all have positions, computed for the same target SIR.
     Settled,
     /// The leader found that the chain can meet no target SIR.
     Infeasible,
