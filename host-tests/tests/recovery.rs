@@ -39,7 +39,7 @@ fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
     one.clone()
 }
 
-/// Returns the numbers of the first, the middle and the last relay, with their names.
+/// Returns the names and numbers of the first relay (the leader), the middle relay and the last relay.
 fn places(relays: u16) -> Vec<(&'static str, u16)> {
     let mut places = vec![
         ("leader", 1),

@@ -95,8 +95,8 @@ fn the_algorithm_agrees_with_the_reference() {
 
 /// Checks a field of interference in which the first target SIR that can be met is not the best.
 ///
-/// That target is 0.00998, the best SIR 0.12195. Upsilon = E[1/I] (I is the interference power) is 0.1, and from x =
-/// 90 m on it is 100.
+/// That target is 0.00998, the best SIR 0.12195. Upsilon = E[1/I] (I is the interference power) jumps at x = 90 m from
+/// 0.1 to 100.
 #[test]
 fn the_first_feasible_target_is_not_the_optimum() {
     let steep = link(100.0, 10.0, 10.0, 1.0, vec![(89.99, 0.1), (90.0, 100.0)]);

@@ -6,10 +6,10 @@ use uav_relay::{Adjust, Local, Method, Settings};
 use crate::hand::{Chain, LOW, WIDE, is_stop};
 use host_tests::bench::Bench;
 
-/// Checks that a message of the leader from before its reboot does not spoil the next agreement.
+/// Checks that a delayed message from before the leader's reboot does not spoil the next agreement.
 ///
-/// The message starts a round along the chain, is delayed, and arrives in the last round of the new agreement, by
-/// Algorithm 2. No relay may act on the message.
+/// The message starts a round along the chain. It arrives during the last round of the agreement after the reboot,
+/// which the relays reach by Algorithm 2. No relay may act on the message.
 #[test]
 fn a_sweep_from_before_a_reboot_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {
@@ -77,7 +77,8 @@ fn a_proposal_of_an_old_view_changes_nothing() {
 
 /// Checks that a relay requests a membership view when a neighbour reports a newer view.
 ///
-/// The neighbour refuses the relay's messages because they belong to the older view.
+/// The neighbour has already accepted the newer view. Therefore it refuses the relay's messages, which belong to the
+/// older view.
 #[test]
 fn a_relay_that_learns_of_a_newer_view_requests_one() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());

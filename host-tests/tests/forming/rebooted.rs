@@ -7,8 +7,8 @@ use host_tests::bench::Bench;
 
 /// Checks that a rebooted leader agrees with its neighbour within a second, at a `hop_time` of 30 ms.
 ///
-/// The random seeds vary the number of the leader's first pass (a round of messages along the chain). This number may
-/// be close to the last number before the reboot.
+/// The random seed determines the number of the rebooted leader's first pass (a round of messages along the chain).
+/// With some seeds this number is close to the number of the last pass before the reboot.
 #[test]
 fn a_rebooted_leader_is_answered_for_any_seed() {
     // Without prediction a chain needs several passes, so a new number may be just below the last one.

@@ -23,8 +23,8 @@ pub(crate) enum FlightEvent {
     Mute(usize),
     Unmute(usize),
     Vanish(usize),
-    /// The drone's relay passes over a silent neighbour and links to the next relay. The third field is the silent relay, the last field
-    /// the new neighbour, if any.
+    /// The drone's relay skips its silent neighbour on one side and links to the next relay. The fields are the drone,
+    /// the side, the silent relay, and the new neighbour, if any.
     Around(usize, Side, usize, Option<usize>),
     Back(usize, Side, usize),
     Forget(usize, Side),
@@ -33,14 +33,16 @@ pub(crate) enum FlightEvent {
     PilotTakesOver(usize),
     /// The drone's motion guard is informed that its pilot has control.
     GuardLearnsOfPilot(usize),
-    /// The pilot moves the drone across the line. The second field has the axis (1 for y, 2 for altitude), true for
-    /// the positive direction, and the distance, m.
+    /// The pilot moves the drone across the line. The second field has the axis (1 for y, 2 for altitude), the
+    /// direction (true for positive), and the largest distance, m.
     Aside(usize, (usize, bool, f64)),
-    /// The pilot moves the drone along the line, to this fraction of the space between its neighbours.
+    /// The pilot moves the drone along the line. The second field is the target x as a fraction of the permitted range
+    /// of x, counted from Tx.
     Along(usize, f64),
     /// The pilot gives control back to the motion guard.
     PilotHandsBack(usize),
-    /// The drone's motion guard learns which relay has the order to leave, by its number; 0 for none.
+    /// The drone's motion guard is informed of the order to leave. The second field is the number of the relay that
+    /// must leave; 0 for none.
     Leaver(usize, u16),
 }
 
@@ -127,8 +129,8 @@ pub(crate) fn failures(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, FlightE
     plan
 }
 
-/// Plans takeovers by pilots, but none of a removed drone or of a drone next to it. `troubles` has the planned
-/// removals and silent relays.
+/// Plans takeovers of drones by their pilots. Removed drones, and drones next to these, are not taken over. `troubles`
+/// has the planned removals and silent relays.
 pub(crate) fn pilots(
     rng: &mut ChaCha8Rng,
     relays: usize,
@@ -240,9 +242,9 @@ pub(crate) fn places(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) 
         .collect()
 }
 
-/// Moves half of the neighbours closer along x, but keeps their minimum separation in space.
+/// Moves random pairs of neighbours closer along x, but keeps their minimum separation in space.
 ///
-/// Relays that are not neighbours keep the minimum separation along x, unless `wild`.
+/// Relays that are not neighbours keep the minimum separation along x, unless `wild` is true.
 pub(crate) fn closer(
     rng: &mut ChaCha8Rng,
     config: &GuardConfig,

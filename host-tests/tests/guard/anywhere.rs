@@ -33,7 +33,7 @@ const SPEED: f64 = 5.0;
 const TARGET_ACCELERATION: f64 = 1.0;
 const ACCELERATION: f64 = 3.0;
 
-/// Longest time from a release at full speed until the drone hovers, overshoot included, s.
+/// Longest time that a drone at full speed takes until it hovers, overshoot included, s.
 const BRAKES_S: f64 = 8.0;
 
 /// Time of the last fault of a simulated flight, s. The flight ends when all drones have arrived.
@@ -81,7 +81,7 @@ struct Drone {
     at: Point,
     velocity: Point,
     bias: Point,
-    /// Point that the autopilot is following, m, in coordinates of the ground and not of a line.
+    /// Point that the autopilot is following, m. Its coordinates refer to the ground, not to a line from Tx to Rx.
     target: Point,
     /// Velocity of the point that the autopilot is following, m/s.
     target_velocity: Point,
@@ -174,7 +174,7 @@ struct World {
     faults: Faults,
     now_s: f64,
     noise_m: f64,
-    /// Distance required of each pair of drones, m: the separation, or the distance at the start if less.
+    /// Distance required of each pair of drones, m, as set by `begin`. It is at most the separation.
     least_m: Vec<f64>,
     /// Time since which each drone has hovered under its pilot's control, s; infinite for other drones.
     hovers_s: Vec<f64>,
@@ -330,7 +330,7 @@ impl World {
         }
     }
 
-    /// Prints the time, and each drone's position, setpoint and reasons to wait, for debugging.
+    /// Prints the time, and each drone's position, setpoint and hold reason on each side, for debugging.
     fn print_state(&self) {
         let each = self.drones.iter().map(|drone| {
             let at = drone.line.along(drone.at);
@@ -373,7 +373,8 @@ impl World {
     }
 }
 
-/// Draws agreed positions: in order along x, separated, and with y and altitude as permitted.
+/// Draws agreed positions in order along x. Neighbours keep the separation along x; y and altitude are within the
+/// geofence.
 fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(config.geofence.most_x_m);
     let step = f64::from(config.separation_m) * 1.001;
@@ -415,7 +416,7 @@ fn config(rng: &mut ChaCha8Rng, relays: usize) -> GuardConfig {
     }
 }
 
-/// Draws start positions of drones: anywhere across the line, and close together along it.
+/// Draws start positions of drones: close together along x, with y and altitude equal or random.
 fn starts(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let apart = f64::from(config.separation_m);
     let step = apart

@@ -44,7 +44,7 @@ pub(crate) struct Drone {
     pub(crate) latency_s: f64,
     /// Motion guard of the drone; `None` while the relay is switched off.
     pub(crate) guard: Option<Guard>,
-    /// First setpoint of the guard after a time without setpoint; `None` while the guard has no setpoint.
+    /// First setpoint that the guard gave after it had none; `None` while the guard has no setpoint.
     begun: Option<Placement>,
     /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],
@@ -102,7 +102,7 @@ impl Drone {
         }
     }
 
-    /// Creates the guard with the mission's neighbours, then sets the neighbours that the relay really has.
+    /// Creates the guard with the neighbours in `mission`, then sets the neighbours in `links`.
     pub(crate) fn boot(
         &mut self,
         config: GuardConfig,
@@ -185,7 +185,7 @@ impl Drone {
             .fly(self.goal, self.speed, self.acceleration, step_s);
     }
 
-    /// Creates reports of the drone's position, and passes those that have arrived to the guard.
+    /// Measures the drone's position if a report is due, and delivers the arrived reports to the guard.
     pub(crate) fn report(&mut self, rng: &mut ChaCha8Rng, board: Board, hover_m: f64, now_s: f64) {
         if now_s >= self.next_report_s {
             self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;

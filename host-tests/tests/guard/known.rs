@@ -80,9 +80,10 @@ fn a_tight_row_of_drones_shifts_in_both_directions() {
     }
 }
 
-/// Checks that drones approach agreed positions that are too close, as far as the separation permits.
+/// Checks that drones come as near as the separation permits to agreed positions that are too close.
 ///
-/// The positions of three drones are 4 m apart along x, so that the outer two would be 8 m apart and not 10 m.
+/// The positions of three drones are 4 m apart along x. The outer two positions are therefore 8 m apart, but these
+/// drones must keep the separation of 10 m.
 #[test]
 fn drones_approach_positions_that_are_too_close() {
     let mut world = world(5, 100.0, 100.0);
@@ -127,7 +128,7 @@ fn drones_approach_positions_that_are_too_close() {
     assert_eq!(before, after, "they stay");
 }
 
-/// Checks that drones reach agreed positions above and beside one another, swap them, and leave them.
+/// Checks that drones reach positions above or beside each other, exchange places, and fly back.
 #[test]
 fn positions_above_each_other_are_reached_and_left() {
     let mut world = world(4, 300.0, 20.0);

@@ -84,7 +84,7 @@ impl Row {
         self.fly();
     }
 
-    /// Links relays 1 and 3, and lets them close up to relay 2. Returns their x.
+    /// Links relays 1 and 3, and makes both approach relay 2. Returns the x of the setpoints of relays 1 and 3, m.
     fn close_up(&mut self) -> [f32; 2] {
         self.all[0].set_neighbour(Side::Downstream, Some(3));
         self.all[2].set_neighbour(Side::Upstream, Some(1));
@@ -111,14 +111,17 @@ fn relays_close_up_to_one_that_leaves() {
     assert_eq!(row.all[0].setpoint(), Some(at(195.0)), "it is gone");
 }
 
-/// Checks that the neighbours of a lost drone that still hovers stay beyond their fences to it.
+/// Checks that the neighbours of a lost relay keep clear of it if it has no order to leave.
+///
+/// Each neighbour keeps half of the separation from its fence to the lost relay. The fence is the plane halfway between
+/// the two relays' agreed positions.
 #[test]
 fn relays_keep_clear_of_a_lost_relay_without_an_order() {
     // Halfway between the two agreed positions, and half of the separation on both sides.
     assert_eq!(Row::new().close_up(), [145.0, 255.0]);
 }
 
-/// Checks that neighbours come no nearer to a relay with the order to leave while its pilot flies it.
+/// Checks that no neighbour approaches relay 2, which must leave, while a pilot flies relay 2.
 #[test]
 fn no_relay_closes_up_to_a_pilot() {
     let mut row = Row::new();
@@ -130,7 +133,7 @@ fn no_relay_closes_up_to_a_pilot() {
     assert_eq!(row.close_up(), [100.0, 300.0]);
 }
 
-/// Checks that a relay that stays after all has the room up to the fences again.
+/// Checks that a relay reaches its agreed position once its order to leave is withdrawn.
 #[test]
 fn a_relay_that_stays_gets_its_room_back() {
     let mut row = Row::new();
@@ -140,8 +143,8 @@ fn a_relay_that_stays_gets_its_room_back() {
     assert_eq!(row.all[1].setpoint(), Some(at(170.0)));
 }
 
-/// Creates the guard of relay 1, which reports the positions `reports` before its first agreement. With `lost` its neighbour is
-/// replaced before it was received.
+/// Creates the guard of relay 1, which reports the positions `reports` before its first agreement. If `lost` is true,
+/// relay 3 replaces the neighbour, relay 2, before relay 2 has sent any message.
 fn joining(reports: &[(u64, f32)], lost: bool) -> (Guard, Instant) {
     let mut guard = Guard::new(config(), [None, Some(2)], 7, Instant::ZERO);
     let mut now = Instant::ZERO;
@@ -157,7 +160,7 @@ fn joining(reports: &[(u64, f32)], lost: bool) -> (Guard, Instant) {
     (guard, now)
 }
 
-/// Returns true if the guard offers its neighbour an association: only then the two can move.
+/// Returns true if the position in the guard's next message permits the neighbour to move.
 fn offers(guard: &mut Guard) -> bool {
     let sent = guard.poll().expect("it sends its position");
     sent.2.flags & Fence::UNPLACED == 0
@@ -191,7 +194,7 @@ fn a_relay_that_joins_from_a_hover_is_known_at_once() {
     }
 }
 
-/// Checks that a relay that joins from its hover does not fly toward a lost drone it never received.
+/// Checks that a hovering relay that joins does not approach a lost drone that never sent it a message.
 #[test]
 fn a_relay_that_joins_keeps_clear_of_a_lost_one() {
     let (mut guard, mut now) = joining(&HOVER, true);
@@ -217,7 +220,9 @@ fn a_relay_that_joins_keeps_clear_of_a_lost_one() {
     assert_eq!(guard.steer(now), Some(at(400.0)));
 }
 
-/// Checks that a neighbour that has not sent a position yet does not make the relay open the chain.
+/// Checks that a neighbour without a known position does not make the relay open the chain.
+///
+/// In an open chain, neighbours are at least the minimum separation apart along x.
 #[test]
 fn a_neighbour_without_a_position_is_not_too_close() {
     let (mut guard, now) = joining(&HOVER, false);
@@ -237,7 +242,7 @@ fn a_neighbour_without_a_position_is_not_too_close() {
     assert_eq!(next.flags & Fence::REQUESTS_OPENING, 0);
 }
 
-/// Checks that a hover in the pilot's hands does not count.
+/// Checks that a hover under the pilot's control does not permit the neighbour to move at once.
 #[test]
 fn a_hover_in_manual_flight_does_not_count() {
     let mut guard = Guard::new(config(), [None, Some(2)], 7, Instant::ZERO);

@@ -169,8 +169,8 @@ impl World {
     }
 
     /// Moves drone `k` along the line, clear of its neighbours, as its pilot does. `share` is the fraction of the
-    /// permitted range of x, counted from Tx. Returns false if a neighbour has not yet received that the pilot flies
-    /// this drone, or if no range is left.
+    /// permitted range of x, counted from Tx. Returns false if no range is left, or if a neighbour does not know yet
+    /// that the pilot flies this drone.
     pub(crate) fn along(&mut self, k: usize, share: f64) -> bool {
         if !self.drones[k].taken || self.drones[k].told != [true; 2] {
             return false;
@@ -195,9 +195,10 @@ impl World {
         least < most
     }
 
-    /// Checks that no two drones are closer than permitted in this step, and cannot be soon after.
+    /// Checks that no two drones are, or soon can be, closer than permitted.
     ///
-    /// The check covers each position where a drone may be before new setpoints arrive.
+    /// The check covers the drones' paths in this step, and each position where a drone may be before new setpoints
+    /// arrive.
     fn check(&mut self) {
         let separation = f64::from(self.config.separation_m);
         let floor = separation - self.allowed_m();

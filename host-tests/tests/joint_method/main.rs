@@ -130,7 +130,9 @@ fn roomy(relays: usize, x_m: f64, y_m: f64, lateral_m: f64, most_m: f64) -> (Lin
     (link, corridor)
 }
 
-/// Checks that the joint method reaches the optima of an independent program in one round trip.
+/// Checks that the joint method reaches known optima in one round trip.
+///
+/// An independent program has computed the optima.
 #[test]
 fn the_joint_optima_are_reached_in_one_round_trip() {
     for (relays, x_m, y_m, lateral_m, most_m, best) in [
@@ -197,7 +199,7 @@ fn a_chain_of_any_length_needs_one_round_trip() {
     }
 }
 
-/// Checks that both neighbours report a relay as lost that stops while all relays compute.
+/// Checks that if a relay stops while all relays compute, both its neighbours report it as lost.
 #[test]
 fn a_relay_that_stops_while_all_compute_is_reported_lost() {
     let (link, corridor) = roomy(50, 500.0, 150.0, 280.0, 300.0);
@@ -217,8 +219,8 @@ fn a_relay_that_stops_while_all_compute_is_reported_lost() {
     }
 }
 
-/// Prints the results. Returns the number within 0.1 % of the optimum, the worst and the best ratio, and the total
-/// number of sweeps (messages along the chain).
+/// Prints the results. Returns the number of results within 0.1 % of the optimum, the worst and the best ratio, and the
+/// total number of sweeps (messages along the chain).
 fn summary(results: &mut [Result]) -> (usize, f64, f64, u32) {
     results.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
     for result in results.iter().take_while(|result| result.ratio < 0.999) {
@@ -258,8 +260,8 @@ fn random_chains_come_near_the_joint_optimum() {
 
 /// Checks that 95 % of random chains with a wide minimum separation are within 0.1 % of the optimum.
 ///
-/// The optimum may need relays that are not as far along the line as the target SIR permits. The joint method does
-/// not consider such positions.
+/// At the optimum, a relay may have to be nearer to Tx than the farthest x that the target SIR permits. The joint
+/// method does not consider such positions.
 #[test]
 fn crowded_chains_are_seldom_far_from_the_joint_optimum() {
     let count = count(60);

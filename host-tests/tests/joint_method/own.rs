@@ -19,8 +19,8 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Draws a chain in the vertical plane in which some relays have their own power or a fixed altitude. Returns `None`
-/// if no relay differs.
+/// Draws a chain in the vertical plane in which some relays have their own power or a fixed altitude. Returns `None` if
+/// all relays have the same power and none has a fixed altitude.
 fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     let drawn = scenario(rng, &(2..=20), ROOMY);
     let mut drawn = with_own(rng, drawn).as_relays_know_it();
@@ -254,8 +254,8 @@ fn faults_change_nothing_on_random_links() {
     assert!(injected > 10_000);
 }
 
-/// Checks that the joint solver reaches the optimum in few computation steps. For this the solver must abandon
-/// hopeless start points, but not the best one.
+/// Checks that the joint solver reaches the optimum in few computation steps. For this the solver must abandon hopeless
+/// start points, but keep the best start point.
 #[test]
 fn few_portions_lead_to_the_joint_optimum() {
     for (relays, lateral_m, most, best) in [

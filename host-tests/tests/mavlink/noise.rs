@@ -90,8 +90,9 @@ fn an_unknown_message_costs_only_its_bytes() {
     assert_eq!(parser.counters().broken, 0);
 }
 
-/// Checks that the costliest known input causes only one checksum for each five to six bytes. In this input each sixteen bytes have three
-/// false frame starts, each of which costs a checksum over 260 bytes.
+/// Checks that the costliest known input causes only one checksum per five to six bytes.
+///
+/// Each 16 bytes of this input have three false frame starts, each of which costs a checksum over 260 bytes.
 #[test]
 fn adversarial_bytes_cost_one_checksum_per_five_bytes() {
     let made = [

@@ -68,7 +68,7 @@ pub(super) fn framed() -> Vec<(Outgoing<'static>, u8, Vec<u8>)> {
         .collect()
 }
 
-/// Returns the first `most` bytes of a text, or all of a shorter one.
+/// Returns the first `most` bytes of a text; a shorter text is returned whole.
 fn cut(text: &str, most: usize) -> &str {
     &text[..text.len().min(most)]
 }

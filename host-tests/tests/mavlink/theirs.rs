@@ -18,7 +18,7 @@ fn bytes(rng: &mut ChaCha8Rng) -> [u8; 4] {
     [0; 4].map(|_| rng.random())
 }
 
-/// Returns messages for pymavlink to encode, each with the result that the crate must decode. Enum values are
+/// Returns messages for pymavlink to encode, each with the value that this crate must decode from it. Enum values are
 /// arbitrary.
 #[expect(clippy::too_many_lines, reason = "a table")]
 pub(super) fn written() -> Vec<(String, Option<Incoming>)> {

@@ -18,22 +18,23 @@ const STEP_MS: u64 = 10;
 /// frame between the two.
 const LIMIT_MS: u64 = 2_000;
 
-/// Longest permitted time in which both duplicate relays have setpoints, ms. The two receive each other, but few
-/// frames are sent in a settled chain.
+/// Longest permitted time in which two relays with the same index both have setpoints, ms. The two receive each other,
+/// but few frames are sent in a settled chain.
 const HEARD_MS: u64 = 10_000;
 
-/// Longest permitted time in which both duplicate relays have setpoints if frames are lost, ms. The frames that
-/// reveal a duplicate may be lost.
+/// Longest permitted time in which two relays with the same index both have setpoints, ms. Frames are lost here, and
+/// may be those that reveal the two relays.
 const HEARD_LOSSY_MS: u64 = 20_000;
 
-/// Longest permitted time in which both duplicate relays have setpoints, ms. The two do not receive each other, and
-/// several index claims in a row may be lost.
+/// Longest permitted time in which two relays with the same index both have setpoints, ms. The two do not receive each
+/// other, and several index claims in a row may be lost.
 const HIDDEN_MS: u64 = 40_000;
 
-/// Longest permitted time until all relays of the chain and one duplicate have setpoints for good, ms.
+/// Longest permitted time until one duplicate and all other relays have lasting setpoints, ms. Duplicates are two
+/// relays with the same index.
 const FLIES_MS: u64 = 60_000;
 
-/// Time of observation after the second duplicate relay was switched on, ms.
+/// Time of observation after the second of two relays with the same index was switched on, ms.
 const WATCHED_MS: u64 = 100_000;
 
 /// Time at which two settled chains come into range of each other, ms.
@@ -76,8 +77,8 @@ struct Case {
 /// Durations measured in one simulated chain with two relays of the same index, ms.
 #[derive(Clone, Copy, Debug, Default)]
 struct Durations {
-    /// Longest time in which both duplicates have setpoints. It counts from `LIMIT_MS` after the first frame that one
-    /// duplicate receives from the other.
+    /// Longest time in which both duplicates have setpoints. The measurement begins `LIMIT_MS` after the first frame
+    /// that one duplicate receives from the other.
     both: u64,
     /// Longest time in which both duplicates have setpoints, from the start of the second duplicate.
     both_at_all: u64,
@@ -169,7 +170,8 @@ fn flown(case: Case) -> Durations {
     found
 }
 
-/// Simulates `COUNT` chains with duplicate relays, and prints the results. Returns each with its seed.
+/// Simulates `COUNT` chains with two relays of the same index, and prints the results. Returns the seed and the result
+/// of each chain.
 fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Durations)> {
     let found: Vec<(u64, Durations)> = (0..number("COUNT", 12))
         .map(|seed| {
@@ -203,8 +205,8 @@ fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Dura
     found
 }
 
-/// Checks that one of two duplicate relays gives up its setpoint in time, and one reports the other. The whole chain
-/// must have setpoints within `FLIES_MS`.
+/// Checks that two relays with the same index both have setpoints for at most `most_ms`. At least one of the two must
+/// report the other. The whole chain must have setpoints within `FLIES_MS`.
 fn at_most_one_flies(medium: Medium, most_ms: u64) {
     let mut faults = Vec::new();
     for kind in 0..8 {
@@ -240,17 +242,17 @@ fn one_of_two_hidden_duplicates_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }
 
-/// Test of two chains that meet on a shared channel. Each chain has one of two relays with the same index
-/// (duplicates).
+/// Test of two chains that meet on a shared channel. A relay of the first chain and a relay of the second chain have
+/// the same index; these two relays are the duplicates.
 ///
-/// Half of the other relays are in one chain, and half in the other. The chains come into range of each other once
-/// both have agreed on positions.
+/// Half of the other relays are in one chain, and half in the other. The chains come into range of each other once both
+/// have agreed on positions.
 #[derive(Clone, Copy, Debug)]
 struct Meeting {
     relays: u16,
     twice: u16,
     loss: f64,
-    /// Epochs of the two duplicate relays.
+    /// Epochs of the two duplicate relays. An epoch is a number that rises at each start of a relay.
     epochs: [u32; 2],
     /// True if only the two duplicates receive each other after the meeting, false if all relays do.
     only_duplicates: bool,

@@ -7,11 +7,13 @@ use uav_relay_sim::simulator::drones::FlightSpec;
 use super::leaves::{AT_S, departing, freed, on_line, times};
 use super::*;
 
-/// Reserve of all relays in these tests, s. In addition, 180 s are reserved for the replacement of a relay.
+/// Endurance that every relay keeps as a reserve in these tests, s. A further 180 s are reserved for the replacement of
+/// a relay.
 const RESERVE_S: u16 = 180;
 
-/// Returns the setup of a simulation of `seconds_s` whose relays have a reserve. `left_s` returns a drone's endurance without the way home,
-/// s; its arguments are the relay and the time in s. `None` stands for no new value.
+/// Returns the setup of a simulation of `seconds_s` whose relays have an endurance reserve. `left_s` returns the
+/// endurance that a drone has in addition to its way home, s. Its arguments are the relay and the time in s. If it
+/// returns `None`, the drone reports no new endurance.
 fn drained(relays: u16, seconds_s: u16, left_s: impl Fn(u16, u16) -> Option<u16>) -> Setup {
     let mut setup = departing(relays, &[]);
     setup.reserve = Some(Duration::from_millis(1_000 * u64::from(RESERVE_S)));
@@ -158,7 +160,7 @@ fn without_a_reserve_no_relay_leaves_by_itself() {
     assert!(told(&outcome, 8).iter().all(Option::is_none));
 }
 
-/// Checks that the initial leader stays outside if it restarts and requests to leave at once.
+/// Checks that the initial leader stays outside the chain if it requests to leave at its restart.
 #[test]
 fn a_first_leader_that_restarts_and_leaves_stays_outside() {
     let mut setup = departing(8, &[]);
@@ -181,8 +183,9 @@ fn a_first_leader_that_restarts_and_leaves_stays_outside() {
     assert!(taken.iter().all(|at| *at < since), "{taken:?}");
 }
 
-/// Checks that the initial leader rejoins the chain by `stay` after a request to leave. It stays outside if it was already permitted to
-/// leave. The request comes at the chain's start or after a restart of the leader.
+/// Checks that the initial leader rejoins the chain if it cancels its request to leave by `stay`. If it already has the
+/// permission to leave, it stays outside the chain. The request comes at the chain's start or after a restart of the
+/// leader.
 #[test]
 fn a_first_leader_that_left_joins_again() {
     for at_s in [0, AT_S - 3] {

@@ -70,7 +70,7 @@ fn drones_keep_away_from_a_silent_hovering_drone() {
     }
 }
 
-/// Checks that a spare is not called to a gap in which a lost drone may still hover.
+/// Checks that no spare (a waiting relay) joins the chain where a lost drone may still hover.
 #[test]
 fn no_spare_is_called_beside_a_lost_drone() {
     for seed in 1..=10 {
@@ -150,7 +150,7 @@ fn drones_keep_away_from_a_relay_that_leaves() {
     assert!(free >= 38, "{free}");
 }
 
-/// Checks that drones come too close without a motion guard, so that the test is able to fail.
+/// Checks that some drones come too close without a motion guard. Otherwise the tests with guards would prove nothing.
 #[test]
 fn without_a_guard_some_drones_come_too_close() {
     let close = (1..=40).any(|seed| {

@@ -116,7 +116,9 @@ fn a_relay_at_a_wide_gap_is_refused() {
     assert_eq!(freed(&outcome, 3), None);
 }
 
-/// Checks that a relay across a gap of more than four numbers may leave once a spare has joined there.
+/// Checks that a relay at a wide gap may leave once a spare has joined the chain in this gap.
+///
+/// A gap is wide if the indices of the relay's two neighbours differ by more than four.
 #[test]
 fn a_spare_fills_a_wide_gap() {
     for leaver in [3, 5] {
@@ -466,9 +468,10 @@ fn worst_hop(link: &Link, serving: &[(u16, Point)]) -> f64 {
     sir(&chain(link, places.len()), &places).unwrap_or(0.0)
 }
 
-/// Returns the lowest SIR after `AT_S`, as a fraction of the optimum of eight relays, and its time, s.
+/// Returns the lowest SIR after `AT_S`, and the time at which this SIR occurs, s.
 ///
-/// `moving` has two relays that join or leave. At each time the data takes the best route with or without these relays.
+/// The SIR is a fraction of the optimum of eight relays. `moving` has two relays that join or leave. At each time the
+/// data takes the best route with or without these relays.
 fn worst_share(link: &Link, outcome: &Outcome, moving: [u16; 2]) -> (f64, f64) {
     let best = chain(link, 8).optimum().unwrap();
     let after = outcome
@@ -504,9 +507,10 @@ struct Replaced {
     text: String,
 }
 
-/// Simulates a chain of eight relays, in which a spare replaces a random relay. In a second run this relay fails.
+/// Simulates a chain of eight relays, in which a spare replaces a random relay. In a second run the same relay fails
+/// instead.
 ///
-/// The spare hovers 15 m beside the position that it would have in a chain of nine relays.
+/// The spare hovers 15 m to the side of the position that it would have in a chain of nine relays.
 fn replaced(link: &Link, rng: &mut ChaCha8Rng, seed: u64) -> Replaced {
     let (mission, _) = of_link(link, 1e-4).unwrap();
     let (spare, leaver) = loop {

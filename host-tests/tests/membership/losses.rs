@@ -7,8 +7,8 @@ use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
 
-/// Returns the time from the last report of a lost relay to the settled chain, and a number of passes. Passes are messages along the chain;
-/// the first `sweeps_before` of them do not count.
+/// Returns the time from the last loss report to the settled chain, and the number of passes. A pass is a round of
+/// messages along the chain; the first `sweeps_before` passes are not counted.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, TimelineEvent::Lost(_));
     let last = outcome

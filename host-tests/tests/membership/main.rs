@@ -31,7 +31,7 @@ fn settles(setup: &Setup, left: &[u16], name: &str) -> Outcome {
 
 /// Checks that the surviving relays `left` have the positions of a chain of only these relays.
 ///
-/// Returns the difference as an error.
+/// The error describes the difference.
 fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
     ledger::judge(setup, outcome, left, 0, *setup.mission.config())
 }

@@ -9,7 +9,8 @@ use uav_relay::wire::frame;
 
 use super::Checked;
 
-/// Epochs of both ends at the time a frame was sent.
+/// Epochs of a frame's sender (`from`) and receiver (`to`) at the time the frame was sent. An epoch is a number that
+/// rises at each start of a relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EpochPair {
     pub(crate) from: u32,
@@ -48,8 +49,8 @@ fn handshake(wire: &[u8]) -> Option<Vec<u8>> {
 }
 
 impl AcceptedFrames {
-    /// Checks that a relay was right to accept a frame from `side`. Returns true if the frame proves that the sender
-    /// is alive.
+    /// Checks that a frame that a relay has accepted from `side` has valid epochs and is new. Returns true if the frame
+    /// proves that the sender is alive.
     pub(crate) fn accept(
         &mut self,
         side: usize,

@@ -27,7 +27,7 @@ pub(crate) struct World<'a> {
     pub(crate) wires: Wires,
     pub(crate) ledgers: Vec<Ledger>,
     pub(crate) tally: Tally,
-    /// Largest epoch of any relay so far.
+    /// Largest epoch that any relay has had so far. An epoch is a number that rises at each start of a relay.
     pub(crate) epochs: u32,
 }
 
@@ -190,8 +190,8 @@ impl<'a> World<'a> {
 
     /// Delivers bytes of a frame to the receiver of `line`, one direction of a link.
     ///
-    /// If they complete a pass (a round of messages along the chain), the model checks how the relay's statistics
-    /// count it.
+    /// If the bytes complete a pass (a round of messages along the chain), the model checks how the relay's statistics
+    /// count this pass.
     pub(crate) fn deliver_and_check(
         &mut self,
         line: usize,

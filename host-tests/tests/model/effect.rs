@@ -153,7 +153,9 @@ impl World<'_> {
         self.turn(leader)
     }
 
-    /// Passes interference samples to a relay, at about `part` per cent of the agreed interference.
+    /// Passes interference samples to a relay, at about `part` per cent of the interference in its mission.
+    ///
+    /// Without a field of interference in the mission, the samples are about `part` per cent of 1 W.
     fn measure(&mut self, relay: u8, part: u8) -> Checked {
         let at = usize::from(relay) % self.relays.len();
         let field = self.scenario.mission.field();

@@ -60,7 +60,7 @@ fn tick(settings: &Settings, relays: usize) -> Duration {
     Duration::from_micros(round.clamp(span / 64 + 1, span / QUESTIONS as u64))
 }
 
-/// Returns the longest interval of heartbeat requests to a neighbour, given the shortest one.
+/// Returns the longest interval of heartbeat requests to a neighbour, from the shortest one, `tick`.
 fn spread(tick: Duration) -> Duration {
     Duration::from_micros(tick.as_micros() + tick.as_micros() / 8 + 1)
 }
@@ -180,7 +180,8 @@ impl Ledger {
         Ok(before != (self.place, self.target, self.holding))
     }
 
-    /// Checks that every membership view of the relay has all relays of the mission. New views must be reported.
+    /// Checks that every membership view of the relay contains all relays of the mission. The relay must report each
+    /// new view.
     fn form(&self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let own = at as u16 + 1;
@@ -343,7 +344,7 @@ impl Ledger {
     }
 
     /// Checks that a relay sends heartbeat requests to a neighbour that is silent for `probe_after`. A neighbour must
-    /// be reported as lost after enough unanswered requests, or after the longest lease.
+    /// be reported as lost after enough unanswered requests, or after a silence as long as the longest possible lease.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {

@@ -49,8 +49,8 @@ pub(crate) enum Operation {
     Measure(u8, u8),
 }
 
-/// Step between random seeds of a leader. A step raises the number of the leader's first message by 64, the least
-/// amount possible. A leader that reboots with such a seed therefore repeats recent numbers.
+/// Difference between two successive random seeds of a leader. It raises the number of the leader's first message by
+/// 64, the smallest possible increase. A leader that reboots with such a seed therefore repeats recent numbers.
 const NEXT_LIFE: u32 = 54_336;
 
 /// Draws a relay's random seed. With some seeds, a rebooted leader repeats its recent message numbers, which is hard

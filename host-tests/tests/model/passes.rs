@@ -14,14 +14,14 @@ use super::ledger::Ledger;
 use super::scenario::Scenario;
 use super::wires::Pass;
 
-/// Divisor of the number of a leader's first pass after its start or in a new membership view. A pass is a message
-/// that travels along the chain. No other pass has a multiple of this number.
+/// Factor of the numbers of first passes: no other pass has a multiple of it as its number. A pass is a message that
+/// travels along the chain. A first pass is the leader's first one after its start or in a new membership view.
 const FIRST: u16 = 64;
 
-/// Largest amount by which the number of a late pass can be below the number of the last pass.
+/// Largest difference between the number of the last pass and the lower number of a late pass.
 ///
-/// A pass is a round of messages along the chain. A pass whose number is farther below counts as a pass from before a reboot. A leader's
-/// next number is above its last number by at most this amount.
+/// A pass is a round of messages along the chain. If the difference is larger, the received pass counts as a pass from
+/// before a reboot. A leader's next number is above its last number by at most this difference.
 const NEAR: u16 = 32;
 
 /// Returns the mark of a membership view: passes carry the mission digest plus this mark.

@@ -50,10 +50,10 @@ impl World<'_> {
         Ok(self.now.since(begun))
     }
 
-    /// Returns the longest permitted time to an agreement after a restart in any state of the chain.
+    /// Returns the longest time that the chain may take to agree after the leader restarts the agreement.
     ///
-    /// The time allows for one lost message in each direction of each link. A relay that waits for a result over h
-    /// hops retransmits after 9/8 of (2 h + 2) `hop_time`.
+    /// The time allows for one lost message in each direction of each link. A relay that waits for a result over h hops
+    /// retransmits after 9/8 of (2 h + 2) `hop_time`.
     fn patience(&self) -> Duration {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;
@@ -76,8 +76,8 @@ impl World<'_> {
         Duration::from_micros(calls * probe_after_us)
     }
 
-    /// Checks that the target SIR agreed by Algorithm 2 is the SIR of the chain's worst hop. Other methods may leave
-    /// a margin.
+    /// Checks that the target SIR agreed by Algorithm 2 is the SIR of the chain's worst hop. By other methods, the
+    /// worst hop may have a higher SIR than the target.
     fn check_stated_target(&self) -> Checked {
         if self.scenario.kind == Kind::Adjust
             && let Some(target) = self.ledgers[0].target

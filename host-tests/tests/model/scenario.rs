@@ -31,17 +31,17 @@ const SCENES: u64 = 400;
 /// Kind of mission: the leader's optimisation method and its data.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
-    /// Algorithm 1, where the leader predicts the target SIR.
+    /// Algorithm 1 (optimises x at given altitudes), where the leader predicts the target SIR.
     Predicted,
-    /// Algorithm 1 without prediction: the leader tries target SIRs by messages. Relays may have their own altitudes
-    /// and powers.
+    /// Algorithm 1 (optimises x at given altitudes) without prediction of the target SIR. The leader tests target SIRs
+    /// by messages along the chain. Relays may have their own altitudes and powers.
     Tried,
-    /// Algorithm 1 with free altitudes.
+    /// Joint method, which optimises x, y and altitude together.
     Altitude,
     Adjust,
-    /// Algorithm 4 in a configured field of interference.
+    /// Algorithm 4 (optimises x in a field of interference), in a configured field.
     Field,
-    /// Algorithm 4 in a field of interference that the relays measure.
+    /// Algorithm 4 (optimises x in a field of interference), in a field that the relays measure.
     Measured,
 }
 

@@ -28,7 +28,7 @@ pub(crate) struct Signs {
     pub(crate) last: Instant,
     /// Number of heartbeat requests since the neighbour was last certainly alive.
     pub(crate) open: usize,
-    /// Number of heartbeat requests since the neighbour was last possibly alive.
+    /// Number of heartbeat requests since the neighbour's last possible sign of life (`possibly_alive`).
     pub(crate) open_since_possible: usize,
     /// Largest number of heartbeat requests that were ever unanswered at the same time.
     ///

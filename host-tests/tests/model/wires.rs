@@ -36,7 +36,7 @@ struct Line {
     recorded: VecDeque<Flying>,
 }
 
-/// Numbers of complete frames that a receiver got.
+/// Counts of the frames whose end a receiver got: intact and broken frames.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ended {
     /// Number of frames that arrived unchanged over the wires.
@@ -148,8 +148,8 @@ impl Wires {
 
     /// Removes and returns a frame in transit on `line`, one direction of a link.
     ///
-    /// The frame overtakes `behind` frames in transit; with 0 it is the next frame to arrive. If there are not as many,
-    /// it is the last frame.
+    /// The frame overtakes `behind` frames in transit; with 0 it is the next frame to arrive. If too few frames are in
+    /// transit, the last of them is taken.
     pub(crate) fn take(&mut self, line: usize, behind: u8) -> Option<Flying> {
         let flying = &mut self.lines[line].flying;
         let last = flying.len().checked_sub(1)?;

@@ -26,7 +26,7 @@ const SHRINK: f64 = 0.6;
 /// SIR of a chain's worst hop, and the x of its relays, m.
 type BestChain = (f64, Vec<f64>);
 
-/// Returns the SIR of the best chain at altitude `h`; 0 if the separation leaves no chain on the grid.
+/// Returns the SIR of the best chain at altitude `h`; 0 if no chain on the grid keeps the separation.
 pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
     let d = scene.distance_m;
     let mut grid: Vec<f64> = (0..=CELLS)

@@ -35,7 +35,7 @@ fn count(case: &Case, name: &str) -> u32 {
     case.args[name].as_u64().unwrap().try_into().unwrap()
 }
 
-/// Checks the single interferer that replaces several against values of a separate program.
+/// Compares the single interferer that is fitted to several with the result of a separate program.
 ///
 /// That program computes the error of the fit as a sum over a grid of nx times nh points.
 #[test]
@@ -101,7 +101,8 @@ fn equal_sources_at_one_position_are_one_of_their_sum() {
     }
 }
 
-/// Checks that a fitted interferer and its stated error change little on a much finer raster. Prints the time.
+/// Checks that a fitted interferer and its stated error hardly change on a much finer raster. Prints the computing time
+/// of each fit.
 #[test]
 fn the_rasters_are_fine_enough() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(74));
@@ -181,7 +182,7 @@ fn extreme_scenes_have_a_finite_fit() {
 }
 
 /// Checks that the fitted interferer is on the same side of the line as the true interferers. Lateral offsets are
-/// permitted here. Without these, the y of the fitted interferer is always positive.
+/// permitted here. If no lateral offsets were permitted, the y of the fitted interferer would always be positive.
 #[test]
 fn with_lateral_range_the_fit_is_on_the_right_side() {
     let source = |x_m: f64, y_m: f64| Source {

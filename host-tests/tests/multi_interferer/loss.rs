@@ -27,7 +27,7 @@ struct Outcome {
     lost: f64,
 }
 
-/// Returns x and altitude of each relay in a scenario with one interferer, m; `None` without a chain.
+/// Returns x and altitude of each relay in a scenario with one interferer, m; `None` if no chain fits.
 fn placed(scenario: &Scenario, n: u16) -> Option<Vec<(f64, f64)>> {
     let (mission, own) = mission::mission(scenario, n, TOLERANCE).ok()?;
     let of = |index: u16| profile_of(&mission, &own, index);

@@ -120,9 +120,10 @@ fn a_scene_without_an_optimum_has_none() {
     assert!(held(false) && !held(true));
 }
 
-/// Checks that positions are found for as many relays as the separation permits, and for a thousand.
+/// Checks that positions are found for as many relays as the separation permits.
 ///
-/// The thousand relays have different powers. One relay too many must be refused.
+/// A separation that is larger by 0.1 % must be refused. Positions must also be found for a thousand relays of
+/// different powers.
 #[test]
 fn crowded_and_long_chains_are_placed() {
     let crowd = |n, apart| Scene {

@@ -96,7 +96,7 @@ pub(crate) fn scene(
     Scene::new(&scenario, n).unwrap()
 }
 
-/// Returns the scene of a chain of the reference model. The only permitted altitude is that of the first relay.
+/// Converts a chain of the reference model to a scene. The only permitted altitude is that of the chain's first relay.
 pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }

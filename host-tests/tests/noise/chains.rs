@@ -83,7 +83,7 @@ fn different_relays_in_noise_meet_the_agreed_target() {
     assert!(all.best * 10 > all.solved * 8, "{all:?}");
 }
 
-/// Checks that message faults do not change a bit of the positions of chains with receiver noise.
+/// Checks that chains with receiver noise agree on bit-identical positions despite message faults.
 #[test]
 fn chains_in_noise_settle_to_the_bit_despite_faults() {
     let mut rng = generator(1104);

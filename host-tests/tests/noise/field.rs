@@ -8,7 +8,7 @@ use uav_relay::{Field, FieldPoint, Interference, Mission, MissionConfig, Schedul
 use uav_relay_oracle::random::{self, log_uniform};
 use uav_relay_sim::report::place;
 
-/// Returns E[f(u)], where u = I / I_max has a Beta distribution, by its density on a grid.
+/// Returns E[f(u)] of u = I / I_max with a Beta distribution, by a sum over a grid.
 fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
     // u = 1 / (1 + e^-z): the density in z is proportional to u^alpha (1 - u)^beta.
     let (mut sum, mut weight) = (0.0, 0.0);

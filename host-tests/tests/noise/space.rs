@@ -32,7 +32,8 @@ fn noisy(number: u64, space: bool) -> Scenario {
     .as_relays_know_it()
 }
 
-/// Returns the joint solver's target SIR as a fraction of the recorded optimum; `None` without a chain.
+/// Returns the joint solver's target SIR as a fraction of the recorded optimum. `None` if the drawn scenario has no
+/// mission or no optimum.
 fn ratio(number: u64) -> Option<f64> {
     let of = noisy(number, number.is_multiple_of(2));
     let (mission, _) = of_link(&of.link, 1e-4)?;
@@ -70,8 +71,8 @@ fn the_joint_optimum_is_found_in_noise() {
     assert!(above * 50 <= of, "{above} of {of}");
 }
 
-/// Checks that message faults do not change a bit of joint positions with noise. The faults are losses of 30 % and
-/// corruption of 15 %.
+/// Checks that the joint method with noise gives bit-identical positions despite message faults. The faults are losses
+/// of 30 % and corruption of 15 %.
 #[test]
 fn joint_chains_in_noise_settle_to_the_bit_despite_faults() {
     let mut injected = 0;

@@ -32,8 +32,8 @@ fn hop_sirs_agree_with_the_reference() {
 
 /// Checks the receiver's farthest x at which a hop meets a target SIR against the reference.
 ///
-/// A third of the targets are near the SIR of a hop whose sender and interferer are equally far from the receiver. The
-/// printed formulas lose precision there.
+/// A third of the targets are near the SIR of a hop whose sender and interferer are equally far from the receiver. Near
+/// that SIR the formulas as printed in the paper lose precision.
 #[test]
 fn reaches_agree_with_the_reference() {
     let seen = reaches_agree(&mut generator(12), 20_000, false, |rng, of| {

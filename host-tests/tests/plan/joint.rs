@@ -95,7 +95,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
 
 /// Returns the fraction by which a plan's SIR is below the SIR at the simulated relays' positions.
 ///
-/// The result is -inf without an agreement.
+/// The result is -inf if the simulated relays reach no agreement.
 fn short(scenario: &Scenario, relays: u16) -> f64 {
     1.0 - free(scenario, Number::Of(relays)).sir() / agreed(scenario, relays)
 }

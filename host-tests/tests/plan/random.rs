@@ -115,8 +115,8 @@ fn random_request(rng: &mut impl Rng) -> PlanRequest {
     }
 }
 
-/// Returns a chain of `n` equal relays for the reference solver, which the plan is compared with. The relays have the
-/// altitude and the power of the scenario. `None` unless the scenario has exactly one interferer.
+/// Returns a chain of `n` equal relays for the reference solver. The plan is compared with the solver's result. The
+/// relays have the altitude and the power of the scenario. `None` unless the scenario has exactly one interferer.
 fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
     let Interference::Sources(sources) = &scenario.interference else {
         return None;
@@ -250,7 +250,7 @@ fn places(plan: &Plan) -> impl Iterator<Item = Place> + '_ {
     plan.places.iter().map(|(place, _)| reference(*place))
 }
 
-/// Checks that plans with lateral offsets have the stated SIR, and come near the recorded optimum.
+/// Checks that plans with lateral offsets reach their stated SIR and come near the recorded optimum.
 #[test]
 fn plans_beside_the_line_have_the_stated_sir() {
     let mut rng = ChaCha8Rng::seed_from_u64(702);

@@ -46,7 +46,8 @@ fn events(relay: &mut Relay) -> Vec<Event> {
     bench::events(relay).collect()
 }
 
-/// Runs the leader until its prediction ends and it sends its first sweep message. Returns time and frame.
+/// Runs the leader until it has predicted a target SIR and sends its first sweep message. Returns the time and the
+/// frame.
 fn first_sweep(head: &mut Relay) -> (Instant, Vec<u8>) {
     for _ in 0..10_000 {
         let now = head.poll_timeout().unwrap();

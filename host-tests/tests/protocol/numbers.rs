@@ -12,7 +12,7 @@ fn sweep_in(bytes: &[u8]) -> Sweep {
     }
 }
 
-/// Returns the last relay after it received a sweep message, and then a copy with a larger number.
+/// Returns the last relay after it received a sweep message and a copy with another message number.
 ///
 /// `off` is added to the number of the copy.
 fn after_two(sweep: &[u8], now: Instant, off: u16) -> Relay {

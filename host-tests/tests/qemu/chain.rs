@@ -139,7 +139,7 @@ fn five_on_async_ports_settle_like_the_simulation() {
     }
 }
 
-/// Checks that an image without the configured method reports this and has no setpoint.
+/// Checks that an image without the configured method refuses the configuration and has no setpoint.
 #[test]
 fn the_smallest_image_refuses_unsupported_methods() {
     let flight = paper(2).by(Method::Joint);

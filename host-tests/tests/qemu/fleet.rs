@@ -110,7 +110,7 @@ impl Fleet {
         Self::begin(which, blocks, &[], None, faults, seed, Life::Fast)
     }
 
-    /// Starts drones with the given flash contents beside their configuration blocks.
+    /// Starts drones whose flash has the contents `kept` in addition to their configuration blocks.
     pub(crate) fn with_flash(
         which: Image,
         blocks: &[Vec<u8>],

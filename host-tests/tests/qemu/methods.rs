@@ -11,7 +11,7 @@ use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
 
 /// Returns a flight of five relays past an interferer at (500, `y_m`) m. Lateral offsets are up to `aside_m`. `held`
-/// is a relay that keeps its altitude, and that altitude.
+/// has the number and the altitude of a relay that keeps this altitude.
 fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
         let own = RelayOverride {
@@ -68,7 +68,7 @@ fn noisy(method: Method, most_m: f64) -> Flight {
     Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
 }
 
-/// Checks that iterative searches with noise give the same bits on the emulated drones as on the host.
+/// Checks that emulated drones and the simulation agree on bit-identical positions with receiver noise.
 #[test]
 fn five_drones_in_noise_settle_like_the_simulation() {
     let silent = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();

@@ -17,7 +17,7 @@ use crate::methods::field;
 /// The test `a_silent_relay_is_noticed_by_both_neighbours_in_time` checks the exact time in simulation.
 const SLACK: u64 = 525_000;
 
-/// Checks that both neighbours of a drone that was switched off report this in time, by their clocks.
+/// Checks that both neighbours report a switched-off drone in time, measured by their own clocks.
 #[test]
 fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let flight = paper(5);

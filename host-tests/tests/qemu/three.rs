@@ -19,9 +19,9 @@ struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of the first relay's refusals of setpoint control to which its pilot has reacted.
+    /// Number of times that the pilot has reacted to the first relay's refusal of setpoint control.
     found: usize,
-    /// True while the pilot has left OFFBOARD because of a refusal, and will choose it again.
+    /// True after the pilot has left OFFBOARD because of a refusal, until the pilot chooses OFFBOARD again.
     chooses: bool,
 }
 

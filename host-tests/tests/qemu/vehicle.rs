@@ -67,7 +67,7 @@ pub(crate) struct Vehicle {
     /// If the companion asks for another mode, the pilot chooses another mode for a while, and then OFFBOARD or
     /// GUIDED again.
     pub(crate) granted: bool,
-    /// Time until which the pilot chooses another mode than OFFBOARD or GUIDED, ms.
+    /// Time until which the pilot stays in a mode other than OFFBOARD and GUIDED, ms.
     elsewhere_until: u64,
     pub(crate) place: Placement,
     /// Ids of the messages that the companion has requested.

@@ -54,7 +54,7 @@ fn three_restarted_drones_keep_their_votes() {
     }
 }
 
-/// Checks that two of three drones get no setpoints if their stored membership view is without them.
+/// Checks that two of three drones get no setpoints if their stored membership view excludes both.
 ///
 /// Without that stored view, the two drones would have a quorum.
 #[test]

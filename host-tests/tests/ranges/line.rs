@@ -37,7 +37,7 @@ pub(crate) fn is_infeasible(line: &Bench) -> bool {
     events.any(|(_, event)| *event == Event::Infeasible)
 }
 
-/// Checks that every reported number is finite, and that no relay refuses messages of another.
+/// Checks that every reported number is finite, and that no relay refuses messages of another relay.
 pub(crate) fn check(line: &Bench) {
     for relay in &line.relays {
         for place in [relay.setpoint(), relay.agreed_place()]

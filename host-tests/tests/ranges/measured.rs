@@ -41,7 +41,8 @@ fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     }
 }
 
-/// Gives random measurements of all nodes to the relays for 60 s, then 1e-9 W. The chain must agree in the end.
+/// Gives all relays random interference measurements for 60 s, and then measurements of 1e-9 W. The measurements
+/// include those at Tx and Rx. The chain must agree in the end.
 fn fly(seed: u64, mission: Mission, settings: Settings) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Some(mut line) = line(mission, Instant::ZERO, |_| settings) else {

@@ -94,7 +94,7 @@ fn degenerate_reaches_are_right() {
     assert_eq!(base.chain_sir(&[1.0]), 0.0);
 }
 
-/// Checks that the reference finds a chain in which relay 1 must stop short of its farthest position.
+/// Checks that the reference finds a chain in which relay 1 is not at its farthest possible position.
 ///
 /// With relay 1 at its farthest position, relay 2, which is lower, would have to be too near to the interferer. The
 /// chain with all relays at their farthest positions has less than a fifth of the best SIR.

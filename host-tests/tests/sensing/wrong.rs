@@ -188,7 +188,7 @@ fn correct_sensors_are_not_accused() {
 
 /// Checks that measurements of Tx and Rx help although they start late or stop early.
 ///
-/// The measurements matter because Rx is behind a hill, which the mission does not know.
+/// The measurements matter because Rx is behind a hill, and the path loss in the mission is that without the hill.
 #[test]
 fn measurements_of_an_end_may_come_late_or_stop() {
     let [begin, late, end] = [0, 60_000, 10_000_000].map(Instant::from_millis);

@@ -21,7 +21,7 @@ pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Port driver of a relay: for two wires or a shared channel, over either kind of mock port.
+/// Port driver of a relay, for two wires or a shared channel. The simulated ports are of the type `IoEnd` or `NbEnd`.
 pub(crate) trait Driver {
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant>;
     /// Returns the counters of each port. The counters of the upstream or shared port come first.
@@ -121,8 +121,8 @@ pub(crate) fn chain(
     (nodes, far)
 }
 
-/// Polls the relays when a timer expires or bytes can be read, and checks the guarantees of `poll`. Returns the time
-/// at the end.
+/// Polls the relays when a timer expires or bytes can be read. Checks that each wake-up time is in the future. Returns
+/// the time at the end.
 pub(crate) fn run(nodes: &mut [Node], from: Instant, until: Instant) -> Instant {
     let mut now = from;
     while now < until {

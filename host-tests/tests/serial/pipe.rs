@@ -88,7 +88,7 @@ impl End {
     }
 }
 
-/// Schedule of read errors: one every `every` bytes, each error loses one byte.
+/// Schedule of read errors: at every `every`-th byte, an error loses one byte.
 #[derive(Clone, Default)]
 pub(crate) struct ReadErrors {
     pub(crate) every: usize,

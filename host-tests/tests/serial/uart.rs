@@ -14,7 +14,7 @@ pub(crate) struct Bench {
     /// Start and end of the transmission of each byte, µs.
     pub(crate) bytes: Vec<(u64, u64)>,
     pub(crate) edges: Vec<(u64, bool)>,
-    /// Numbers of coming attempts that fail: to set the driver-enable pin low, and to set it high.
+    /// Number of further attempts to set the driver-enable pin that fail: to low, and to high.
     pub(crate) refusals: [u32; 2],
 }
 

@@ -216,9 +216,10 @@ fn both_views_have_every_relay_and_every_hop_inside_the_frame() {
     }
 }
 
-/// Checks that the view from above draws relays, interferer and edges at their y, to one scale.
+/// Checks that the view from above draws all objects at their y, to one scale.
 ///
-/// Positive y is to the right of the direction from Tx to Rx, and therefore drawn downward.
+/// The objects are the relays, the interferer, and the edges of the permitted offsets. Positive y is to the right of
+/// the direction from Tx to Rx, and therefore drawn downward.
 #[test]
 fn the_view_from_above_is_to_scale() {
     let picture = swung(8, 0.9);

@@ -10,7 +10,7 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use crate::{Figures, RATE, quantile, s, seconds, setup};
 
-/// Control states, each with true if the autopilot flies to another target.
+/// Control states, each with a flag. The flag is true if the autopilot flies to a target other than the setpoint.
 const STATES: [(State, bool); 6] = [
     (State::Silent, false),
     (State::Grounded, false),
@@ -40,7 +40,7 @@ fn place(rng: &mut ChaCha8Rng) -> Placement {
     }
 }
 
-/// Checks that a position that a relay receives only once still reaches the station.
+/// Checks that a position that the autopilot gives a relay only once still reaches the station.
 #[test]
 fn a_position_that_is_given_once_reaches_the_station() {
     for (relays, access) in [(2, None), (4, None), (8, Some(Access::Ideal))] {
@@ -288,7 +288,8 @@ fn alarms_are_known_in_time() {
 
 /// Checks that alarms do not prolong the time without a lease after the loss of both end relays.
 ///
-/// This time is some 15 s. The other relays report alarms in it: all at the same time, or spread as relays spread them.
+/// A relay may use an agreement only with a valid lease. The time without a lease is some 15 s. The other relays report
+/// alarms in this time: all at once, or spread as relays spread them.
 #[test]
 fn alarms_beside_the_loss_of_both_ends_delay_no_lease() {
     let span = [s(60), s(120)];

@@ -75,7 +75,8 @@ struct Figures {
 }
 
 impl Figures {
-    /// Advances `chain` to `until` in steps of 0.1 s. From `from` on it records the ages of the reports of `relays` at `end`.
+    /// Advances `chain` to `until` in steps of 0.1 s. From `from` on it records the ages of the reports of `relays`
+    /// that the station at `end` has.
     fn watch(&mut self, chain: &mut Chain, end: Side, relays: &[u16], [from, until]: [Instant; 2]) {
         let mut tracks: Vec<Vec<(Instant, Placement)>> = vec![Vec::new(); relays.len()];
         self.ages_s.resize(relays.len(), Vec::new());
@@ -184,7 +185,7 @@ fn is_telemetry(wire: &[u8]) -> bool {
 
 /// Returns the least distance of `place` from the positions of a drone within 0.4 s of `at`, m.
 ///
-/// Times of reports are in tenths of a second per hop, and positions are reported every 0.2 s.
+/// Each hop rounds the time of a report to tenths of a second, and positions are reported every 0.2 s.
 fn error(track: &[(Instant, Placement)], at: Instant, place: Placement) -> f64 {
     let near = Duration::from_millis(400);
     let axes = |of: Placement| [of.x_m, of.y_m, of.altitude_m].map(f64::from);

@@ -3,7 +3,8 @@
 use super::scene::Scene;
 
 impl Scene {
-    /// Returns the best SIR in ranges of x and altitude, by brute force. The search is along lines first, then around the best points.
+    /// Returns the best SIR in ranges of x and altitude, by brute force. The search is along x at some altitudes and
+    /// along the altitude at some x, and then around the three best points.
     pub(crate) fn brute(&mut self, x: (f64, f64), h: (f64, f64)) -> f64 {
         let lines = |(low, high): (f64, f64)| {
             if low < high {

@@ -6,7 +6,7 @@ use super::*;
 
 const AT: Instant = seconds(20);
 
-/// Runs `setup` with an upload of `config`. Returns the time from the upload to the last agreement, ms, and the
+/// Runs `setup` with an upload of `config`. Returns the time from the upload to the last event `Converged`, ms, and the
 /// number of bytes that are sent because of the upload.
 fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
     let mut calm = setup.clone();
@@ -45,7 +45,9 @@ fn an_uploaded_interferer_is_flown_from_either_end() {
     }
 }
 
-/// Checks that all relays fly an uploaded mission that adds, removes or changes the return direction.
+/// Checks that all relays fly an uploaded mission that adds, removes or changes the direction Rx to Tx.
+///
+/// The change is another transmit power of Rx.
 #[test]
 fn a_way_back_is_uploaded_and_flown_by_all() {
     let back = |base: MissionConfig, reverse: f32, rx_power_w: f32| MissionConfig {
@@ -67,6 +69,8 @@ fn a_way_back_is_uploaded_and_flown_by_all() {
 }
 
 /// Checks that all relays with the joint method fly an upload that adds or removes fitted slots.
+///
+/// Fitted slots are time slots that are as long as each hop needs.
 #[test]
 fn fitted_slots_are_uploaded_and_flown_by_all() {
     let equal = *mission(5).config();

@@ -16,7 +16,8 @@ fn fitted(base: &Mission) -> MissionConfig {
     }
 }
 
-/// Returns the settings of a relay with the joint method. With a mission of fitted slots the relay fits its time slots.
+/// Returns the settings of a relay with the joint method, which a mission with fitted slots needs. Fitted slots are
+/// time slots that are as long as each hop needs.
 fn joint() -> Settings {
     Settings {
         method: Method::Joint,
@@ -31,8 +32,8 @@ fn shares(wires: &Wires) -> Vec<bool> {
 
 /// Checks that relays refuse fitted slots that their settings or the interference do not allow.
 ///
-/// The refusal is counted and reported like the refusal of a mission outside the geofence. A newer mission is then
-/// flown.
+/// Fitted slots are time slots that are as long as each hop needs. The refusal is counted and reported like the refusal
+/// of a mission outside the geofence. A newer mission is then flown.
 #[test]
 fn fitted_slots_against_the_settings_are_refused() {
     let base = mission(3);
@@ -74,6 +75,8 @@ fn fitted_slots_against_the_settings_are_refused() {
 }
 
 /// Checks that no relay has slot shares of the previous mission once it flies an upload.
+///
+/// Slot shares are the start and end of a relay's time slots, as fractions of the frame.
 #[test]
 fn shares_end_with_their_mission() {
     let equal = mission(4);
@@ -106,7 +109,8 @@ fn shares_end_with_their_mission() {
 
 /// Checks that relays without a lease or without a quorum have no slot shares until the next agreement.
 ///
-/// On a shared channel relays 3 to 5 have a quorum, and the shares of their view. On wires they cannot close the gap.
+/// Slot shares are the start and end of a relay's time slots. On a shared channel relays 3 to 5 have a quorum, and the
+/// shares of their view. On wires these relays cannot close the gap that relays 1 and 2 leave.
 #[test]
 fn shares_end_without_a_quorum() {
     let base = Mission::try_new(fitted(&mission(5))).unwrap();

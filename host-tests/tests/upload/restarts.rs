@@ -4,7 +4,7 @@ use uav_relay::Wiring;
 
 use super::*;
 
-/// Runs eight relays that all reboot after an upload. The relays `forgetful` have lost the upload then.
+/// Runs eight relays that all reboot after an upload. The relays `forgetful` lose the upload in this reboot.
 fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
     let base = mission(8);
     let mut setup = signed(base, wiring == Wiring::Shared);

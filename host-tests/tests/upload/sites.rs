@@ -45,7 +45,7 @@ fn sited(relays: u16, shared: bool) -> (Mission, Setup) {
     (base, setup)
 }
 
-/// Checks that all relays use the positions of Tx and Rx of mission `version`, and calls [`judge`].
+/// Checks a run with [`judge`], and that all relays use the Tx and Rx positions of mission `version`.
 ///
 /// If this mission was not uploaded or has no such positions, the positions from before flight apply.
 fn judge_between(setup: &Setup, outcome: &Outcome, version: u16) -> Result<(), String> {

@@ -234,8 +234,8 @@ fn a_relay_with_its_own_altitude_refuses_like_the_others() {
 
 /// Checks that a refusal by any relay reaches the ground station, also if frames are lost.
 ///
-/// This relay, at any place in the chain, refuses because only it has a geofence. A newer mission that fits its geofence must clear the
-/// refusal.
+/// One relay, at any place in the chain, refuses because only this relay has a geofence. A newer mission that fits the
+/// geofence must clear the refusal.
 #[test]
 fn a_refusal_of_any_relay_reaches_the_ground() {
     (0..count()).into_par_iter().for_each(|round| {

@@ -28,7 +28,8 @@ pub(crate) struct Kind {
     pub(crate) reach: usize,
     /// Relay (from 0) that has another mission than the others before flight, if any, and that mission.
     pub(crate) stranger: Option<(usize, Mission)>,
-    /// Relay (from 0) whose epoch goes back at its second start, if any.
+    /// Relay (from 0) whose epoch is lower after its second start than before, if any. An epoch is a number that
+    /// otherwise rises at each start of a relay.
     pub(crate) goes_back: Option<usize>,
     /// Relay (from 0) that has a copy, a second drone with the same index; `None` if no relay has one.
     ///
@@ -42,7 +43,7 @@ pub(crate) enum ScheduledEvent {
     /// The relay is switched on. After a reboot it has its stored votes and upload.
     On(usize),
     Off(usize),
-    /// An operator informs the relay that the other drone with its index is gone.
+    /// An operator informs the relay that the other drone with the same index has been removed.
     Clear(usize),
     /// The relay requests to leave the chain, with this remaining endurance, s.
     Leave(usize, Option<u16>),
@@ -113,11 +114,11 @@ pub(crate) struct Air {
     /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
     /// the agreed membership of the chain.
     pub(crate) whole_since_us: Option<u64>,
-    /// Number of relays that may lack an agreed position while the chain counts as flying (`flown_us`).
+    /// Number of relays that may lack an agreed position in the time that counts as flown (`flown_us`).
     pub(crate) spare: usize,
-    /// Total time in which all relays, except up to `spare`, had a position of one agreement, µs.
+    /// Total time in which all relays, except at most `spare`, had positions of one agreement, µs.
     pub(crate) flown_us: u64,
-    /// First time at which all relays, except up to `spare`, had a position of one agreement, µs. `None` before then.
+    /// First time at which all relays, except at most `spare`, had positions of one agreement, µs. `None` before.
     pub(crate) first_us: Option<u64>,
     /// Longest time in which more than `spare` relays lacked an agreed position, µs.
     pub(crate) longest_us: u64,
@@ -468,7 +469,7 @@ impl Air {
         }
     }
 
-    /// Adds the time since the last call to `flown_us`, or to the present interruption of the chain.
+    /// Counts the time since the last change as flown (`flown_us`) or as an interruption (`longest_us`).
     pub(crate) fn measure(&mut self) {
         let span_us = self.now_us - self.changed_us;
         if self.flies {

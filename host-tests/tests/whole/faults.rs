@@ -111,8 +111,8 @@ fn a_left_out_relay_attracts_no_other() {
 
 /// Random seeds of links that stay up a little longer than the longest hold-down of 90 s.
 ///
-/// After repeated losses of a link, a relay does not use the link until the hold-down has passed. In these runs one end
-/// of the link uses it earlier than the other end. Soon afterwards the link is lost again.
+/// The hold-down is a waiting time: after repeated losses of a link, a relay does not use the link until it has passed.
+/// In these runs one end of the link uses the link before the other end does. Soon afterwards the link is lost again.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
 /// Checks that one flapping link costs at most a tenth of the time with agreed positions. The link fails and returns

@@ -144,9 +144,8 @@ fn ends_whole(schedule: fn(u64) -> Schedule) {
 
 /// Checks that of two drones with the same index, one loses its setpoint within 2 s.
 ///
-/// The second drone is called the copy. The chain must be whole once one of the two is removed. Two agreements may be
-/// in use at the same time only if a cut separates relay and copy: then both vote, so that two parts of the chain can
-/// have a quorum.
+/// The chain must be whole once one of the two is removed. Two agreements may be in use at the same time only if a cut
+/// separates the two drones: then both drones vote, so that two parts of the chain can have a quorum.
 #[test]
 fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
@@ -268,8 +267,9 @@ fn a_relay_with_far_later_views_joins_within_120_s() {
 
 /// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
-/// If `forward`, about half of the steps are forward, otherwise all are back. Returns the number of chains, the results
-/// of those that recovered late, and the results of those in which two agreements were in use at the same time.
+/// If `forward` is true, about half of the steps are forward; otherwise all steps are back. Returns the number of
+/// chains, the results of those that recovered late, and the results of those in which two agreements were in use at
+/// the same time.
 fn with_steps(forward: bool) -> (u64, Vec<Measured>, Vec<Measured>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);

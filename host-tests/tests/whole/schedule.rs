@@ -132,7 +132,8 @@ pub(crate) fn random(seed: u64) -> Schedule {
     schedule
 }
 
-/// Draws a schedule of faults in which relays also leave the chain. Each of them cancels its departure in the end.
+/// Draws a schedule of faults in which relays also leave the chain. Each relay that leaves cancels its departure in the
+/// end.
 pub(crate) fn with_departures(seed: u64) -> Schedule {
     let mut schedule = random(seed);
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0x5555);

@@ -140,8 +140,8 @@ fn a_stored_mission_is_flown_after_a_reboot() {
 
 /// Checks which mission offers count as answers to a hello: the others are stale.
 ///
-/// A relay's hello has a number. The relay takes a new number when the time `dead_after` has passed since the first
-/// use of the old one. An offer must repeat one of the last two numbers. This number must have been sent at most
+/// A relay's hello has a number. The relay takes a new number when the time `dead_after` has passed since the first use
+/// of the old number. An offer must repeat one of the last two numbers. It is stale if this number was sent more than
 /// twice `dead_after` ago.
 #[test]
 fn an_offer_that_answers_no_recent_hello_is_stale() {

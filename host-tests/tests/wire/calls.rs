@@ -86,7 +86,7 @@ fn a_leader_without_quorum_proposes_at_growing_intervals() {
 
 /// Checks that a hello is answered by another hello only if it requests an answer.
 ///
-/// If a hello reports a far later membership view, the relay raises the view number in its answer by at most 4096.
+/// If a hello reports a far later membership view, the view number in the answer is at most 4096 above the relay's own.
 #[test]
 fn a_hello_is_answered_by_a_hello_on_request() {
     for (asks, newest, known) in [

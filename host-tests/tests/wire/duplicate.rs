@@ -24,7 +24,7 @@ fn receive(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, WireMessag
     bench.sent_with_claims()
 }
 
-/// Returns relay 4 of 8 after it received a sweep message that names relay 4 as the sender.
+/// Returns relay 4 of 8 after it received a sweep message whose sender also has number 4.
 ///
 /// The relay has answered by an index claim, because another node may have its index. Also returns that sweep message
 /// and the number of the claim.
@@ -57,10 +57,10 @@ fn a_neighbours_claim_is_echoed_to_its_number() {
     }
 }
 
-/// Checks that a relay turns passive if a larger claim names the relay's own claim number.
+/// Checks that a relay turns passive if a claim with a larger number names the relay's own claim.
 ///
-/// A claim is larger if its number is. A claim that does not name the relay's number may date from before the relay's
-/// start: the relay answers it and stays active.
+/// A claim that does not name the number of the relay's claim may date from before the relay's start: the relay answers
+/// it and stays active.
 #[test]
 fn the_smaller_claim_turns_passive_and_the_larger_answers() {
     for (wiring, port) in PORTS {

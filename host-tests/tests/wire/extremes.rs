@@ -9,8 +9,8 @@ use uav_relay_decode::{range, walk};
 use super::golden::vectors;
 use super::message::FORMAT;
 
-/// Values of each message field that occur in the test vectors, as text. The key is the message's name and the
-/// field's.
+/// Values of each message field that occur in the test vectors, as text. The key has the name of the message and the
+/// name of the field.
 type BoundsSeen = BTreeMap<String, BTreeSet<String>>;
 
 /// Returns the name under which a message's fields are collected. Messages with the same fields share a name.

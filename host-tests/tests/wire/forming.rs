@@ -86,8 +86,8 @@ fn decided_by(last: &mut Bench, proposal: &WireMessage) -> WireMessage {
     message
 }
 
-/// Checks the quorum: more than half of the earlier view's members, or half of them with its proposer. A view is the
-/// agreed membership of the chain. The proposer of the earlier view must be among the half that votes.
+/// Checks that a quorum is over half of the earlier view's members, or half with the view's proposer. A view is the
+/// agreed membership of the chain. The view's proposer must be among the half that votes.
 #[test]
 fn a_quorum_is_over_half_or_half_with_the_proposer() {
     for quorum in [true, false] {
@@ -150,7 +150,8 @@ fn a_member_adds_its_vote() {
 
 /// Checks that the last relay decides for an earlier view if relays may have agreed on it already.
 ///
-/// The value that was accepted last is proposed again, as in Paxos. A view is the agreed membership of the chain.
+/// As in Paxos, the view of the latest accepted proposal is proposed again. A view is the agreed membership of the
+/// chain.
 #[test]
 fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);

@@ -13,7 +13,7 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Field of interference (Upsilon = E[1/I] along x) in which a chain of eight can meet a target SIR.
+/// Field of interference (Upsilon = E[1/I] along x) with a target SIR that eight relays can meet.
 pub(crate) const FIELD: Field = Field::new(&[at(-100.0, 1e8), at(500.0, 3e7), at(900.0, 2e8)]);
 
 /// Field of interference that is as weak as the format permits.
@@ -141,7 +141,7 @@ pub(crate) fn level(mission: u16) -> WireMessage {
     WireMessage::new("Level", &json!({ "mission": mission, "power_w": 1e-9 }))
 }
 
-/// Returns an index claim with its number, by a node that has received a claim with the number `other`.
+/// Returns the index claim `number`, by a node that has received a claim with the number `other`.
 pub(crate) fn claim(number: u32, other: u32, flags: u8) -> WireMessage {
     let fields = json!({ "number": number, "other_number": other, "flags": flags });
     WireMessage::new("Claim", &fields)
@@ -162,7 +162,7 @@ pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     }
 }
 
-/// Gives the relay a position: delivers the sweep message `number`, and then its result.
+/// Gives the relay a position. Delivers the sweep message `number` at the port `from`, and then its result at `to`.
 pub(crate) fn place(bench: &mut Bench, (from, to): (Port, Port), number: u16) {
     let kinds = one_of_each(number, bench.mission);
     bench.receive(from, &kinds[0]);

@@ -24,7 +24,7 @@ fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     targets[8..].to_vec()
 }
 
-/// Returns the coded target SIRs of a sweep message: anchor, gap and growth.
+/// Returns the target SIRs of a sweep message as encoded: absolute `anchor`, `gap` and `growth`.
 fn ladder_of(sweep: &WireMessage) -> (f32, u8, u8) {
     let code = |name| sweep.number(name) as u8;
     let anchor = sweep.number("anchor") as f32;

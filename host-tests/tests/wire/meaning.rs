@@ -20,7 +20,7 @@ use uav_relay_decode::value::{Fields, Value};
 use super::message::{WireMessage, list, number};
 use super::offer;
 
-/// Fields of a message, or of a group in it. The functions return their values in the crate's types.
+/// Fields of a message, or of a group in it. Each function returns the value of a field in the crate's type.
 struct MessageFields<'a>(&'a Fields<'static>);
 
 impl MessageFields<'_> {

@@ -57,8 +57,8 @@ const NODES: [u16; 20] = [
 
 const SITES: [i32; 2] = [900_000_000, 1_800_000_000];
 
-/// Returns all 4-byte numbers to try in a body: f32, view identifiers and coordinates of Tx and Rx. The body's own
-/// numbers and their neighbours are added if the rules of its message compare them.
+/// Returns all 4-byte numbers to try in a body: f32, view identifiers and coordinates of Tx and Rx. In messages whose
+/// rules compare numbers, the body's own numbers and the numbers next to these are added.
 fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     let mut floats: Vec<f32> = BOUNDS.iter().map(|bound| *bound as f32).collect();
     let own = match message {
@@ -89,8 +89,8 @@ fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     quads
 }
 
-/// Returns f64 to try in an offer: limits, path-loss factors, and the f64 next to each of these. The factors are the
-/// body's own, and 1e20 times these.
+/// Returns f64 to try in an offer: limits, path-loss factors, and the f64 next to each of these. The factors are those
+/// in the body, and each of those times 1e20.
 fn octets(body: &[u8]) -> Vec<[u8; 8]> {
     let own = body
         .windows(8)

@@ -93,7 +93,7 @@ fn near_relay_4() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Sends random pieces of frames to relay `index` of 8. Asserts that every counter named in `expected` counts.
+/// Sends random pieces of frames to relay `index` of 8. Asserts that each counter named in `expected` exceeds 5.
 fn fed_with_anything(
     interference: Interference,
     index: u16,

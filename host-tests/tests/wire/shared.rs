@@ -9,14 +9,14 @@ use super::votes::{ASKS, FORMS, FRESH, id, loaded_hello, with_neighbours};
 
 const AIR: Port = Port::Shared;
 
-/// Returns relay 6 of 12 on a shared channel, and a sweep message for it.
+/// Returns relay 6 of 12 on a shared channel, and a sweep message that tests can deliver to the relay.
 fn sixth() -> (Bench, WireMessage) {
     let bench = Bench::new(6, 12, Wiring::Shared);
     let sweep = one_of_each(FIRST, bench.mission)[0].clone();
     (bench, sweep)
 }
 
-/// Returns the hello of a node that receives its nearest node and has chosen the neighbour `neighbour`.
+/// Returns a hello whose sender receives its nearest node and has chosen the neighbour `neighbour`.
 ///
 /// The hello requests nothing.
 fn hello_choosing(bench: &Bench, neighbour: u16) -> WireMessage {

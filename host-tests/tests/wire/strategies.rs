@@ -23,7 +23,7 @@ pub(crate) fn headers() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Draws valid messages of the kinds `names`. After a failure, proptest simplifies a message to one of zeros.
+/// Draws valid messages of the kinds `names`. After a failure, proptest replaces values by 0 to find a simple message.
 pub(crate) fn kinds(names: &'static [&'static str]) -> BoxedStrategy<WireMessage> {
     (proptest::sample::select(names), vec(any::<u8>(), 0..400))
         .prop_map(|(name, bytes)| {

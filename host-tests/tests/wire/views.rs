@@ -179,9 +179,9 @@ fn a_view_request_is_forwarded_unless_its_view_is_older() {
     }
 }
 
-/// Checks that an accepted membership view counts as agreed only after a first message in it.
+/// Checks that an accepted membership view counts as agreed only after the first message of this view.
 ///
-/// The message is a sweep along the chain or a lease renewal, which is sent only once all members have accepted the
+/// The message is a sweep along the chain or a lease renewal. Both are sent only once all members have accepted the
 /// view.
 #[test]
 fn a_view_counts_after_its_first_pass_or_renewal() {

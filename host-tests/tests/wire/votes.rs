@@ -28,8 +28,8 @@ pub(crate) fn mark(view: u32) -> u16 {
 /// that long.
 pub(crate) const RELIED: u16 = 150;
 
-/// Returns the proposal of membership view `view` as the relay at position `place` forwards it. All relays up to
-/// `place` have booted and voted for it.
+/// Returns the proposal of view `view`, as the relay at place `place` of the chain forwards it. A view is the agreed
+/// membership of the chain. All relays up to this one have booted and voted for the view.
 pub(crate) fn proposed(
     view: u32,
     (mission, version): (u16, u16),
@@ -44,17 +44,17 @@ pub(crate) fn proposed(
     WireMessage::new("Proposal", &fields)
 }
 
-/// Returns the decision that accepts a proposed membership view of `relays` relays. The relay at position `place`
-/// sends it, and the view's positions may be used at once. `of` is the digest and the version of the view's mission.
+/// Returns the decision that accepts a proposed membership view of `relays` relays. The relay at place `place` of the
+/// chain sends it. The view's positions may be used at once. `of` is the digest and the version of the view's mission.
 pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> WireMessage {
     let accepted = json!({ "view": view, "relays": relays });
     let changes = json!({ "base_relays": relays, "accepted": accepted });
     refused(view, of, place, relays).with(changes)
 }
 
-/// Returns the decision message with which the relay at position `place` refuses a membership view.
+/// Returns the decision with which the relay at place `place` of the chain refuses a membership view.
 ///
-/// The reason for the refusal is that only `there` of eight relays have voted for the view.
+/// The reason for the refusal is that only `there` of the eight relays have voted for the view.
 pub(crate) fn refused(
     view: u32,
     (mission, version): (u16, u16),
@@ -90,8 +90,8 @@ pub(crate) fn loaded_hello(newest: u32, mission: u16, neighbour: u16, flags: u8)
 
 /// Returns a copy of a hello with other values for received nodes and connected relays.
 ///
-/// Bit 0 of `hears` is the nearest node. `behind` is the number of connected relays from the sender (included) away
-/// from the destination.
+/// Bit 0 of `hears` is the nearest node. `behind` is the number of relays that are connected in the direction away from
+/// the destination, the sender included.
 pub(crate) fn with_neighbours(hears: u8, behind: u16, hello: &WireMessage) -> WireMessage {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }

@@ -28,7 +28,7 @@ pub enum StackError {
     Recursion(String),
     /// The function's stack frame has no constant size.
     Dynamic(String),
-    /// The image has no such function.
+    /// The image has no function with this name.
     Unknown(String),
 }
 

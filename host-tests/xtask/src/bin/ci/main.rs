@@ -83,7 +83,7 @@ fn main() -> ExitCode {
 
 /// Runs the numbered steps of `lane` one after the other; returns the failures.
 ///
-/// The main lane runs at the same time.
+/// A lane is a sequence of steps. The main lane runs at the same time.
 ///
 /// The output of a step is printed at its end, so that it does not mix with others. `all` is the number of all steps,
 /// for the headings.
@@ -121,7 +121,7 @@ fn run<'a>(
     failure.map(|evidence| (&**name, evidence))
 }
 
-/// Number of output lines that are repeated at the end for a failed step without tests: the last ones.
+/// Number of last output lines that are repeated at the end for a failed step without tests.
 const LAST_LINES: usize = 20;
 
 /// Maximum number of lines repeated from a list of failures, either panics or names of failed tests.

@@ -144,7 +144,7 @@ fn prepare_program(program: &str) -> Result<(), String> {
 
 /// Returns true if the libraries of a compilation target are installed.
 ///
-/// Called with `arguments`, rustc prints their folder, even if the folder does not exist.
+/// Called with `arguments`, rustc prints the folder of these libraries, even if the folder does not exist.
 fn target_is_there(arguments: &[&str]) -> bool {
     let output = Command::new("rustc").args(arguments).output();
     output.is_ok_and(|output| {

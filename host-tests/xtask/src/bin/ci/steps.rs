@@ -59,7 +59,7 @@ pub(crate) struct Step {
     pub(crate) lane: Lane,
 }
 
-/// Sequence of steps. The lanes run at the same time.
+/// Sequence of steps of `cargo ci`. All lanes run at the same time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Lane {
     /// Main lane: its steps run one after the other.
@@ -101,7 +101,7 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
 
 /// Returns `steps` for the background lane: at the same time as other lanes, at low priority.
 ///
-/// They use idle time: many tests wait for the wall clock.
+/// These steps use the time in which many tests of other lanes wait for the wall clock.
 fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
     let moved = |step| Step {
         lane: Lane::Background,
@@ -238,8 +238,8 @@ const WAITING_TESTS: &str = "6";
 
 /// Returns the steps that build all programs and tests of the workspace, and run the tests.
 ///
-/// All of them select the whole workspace. Cargo enables the features that any selected package needs of a dependency, so another
-/// selection compiles most packages once more.
+/// All of these steps select the whole workspace. Cargo enables the features that any selected package needs of a
+/// dependency. A step with another selection of packages would compile most packages once more.
 fn workspace_tests() -> Vec<Step> {
     let others: Vec<String> = integration_tests()
         .into_iter()

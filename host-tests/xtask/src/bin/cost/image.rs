@@ -233,8 +233,8 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 /// Returns the largest stacks of the main thread and of one interrupt, bytes.
 ///
 /// The thread begins with the function that `Reset` calls. The interrupt's stack includes the registers that the
-/// processor saves, with those of the FPU. `pair` is true for ports to two neighbours, `flies` for a port to an
-/// autopilot.
+/// processor saves, also those of its floating-point unit. `pair` is true for ports to two neighbours, `flies` for a
+/// port to an autopilot.
 pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let output = run(Command::new(objdump()?)
@@ -274,7 +274,7 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Checks that a deliberate panic is found: an image with one must not link. [`proven`] links the images without one.
+/// Checks that an image with a deliberate panic does not link. [`proven`] links the images without it.
 pub(crate) fn a_panic_is_found() -> Result<(), String> {
     only_finished_futures_panic()?;
     let mut link = cargo("rustc", RELAY);

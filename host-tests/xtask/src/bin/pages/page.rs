@@ -5,7 +5,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 
-/// Words after the fence that mark the commands of a code block as not run.
+/// Words after a code block's opening fence that mark the commands of the block as not run.
 const WHY_NOT: [&str; 6] = ["hardware", "itself", "root", "slow", "tested", "window"];
 
 /// Kind of a code block on a page.
