@@ -88,7 +88,7 @@ fn no_spare_is_called_beside_a_lost_drone() {
     }
 }
 
-/// Checks that a spare that joins by `stay`, at any x beside the line, does not fly through a lost drone.
+/// Checks that a spare that joins by `stay`, at any x, does not fly through a lost drone.
 #[test]
 fn a_spare_joins_at_any_x_and_keeps_away_from_a_lost_drone() {
     let mut joined = 0;

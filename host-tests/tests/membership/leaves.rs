@@ -289,7 +289,7 @@ fn a_departure_ends_well_if_the_relay_stays_or_dies() {
     }
 }
 
-/// Checks that the chain recovers as after a loss if the relay that leaves, or its spare, dies during the replacement.
+/// Checks that the death of a relay that leaves, or of its spare, is like any loss.
 ///
 /// The environment variable `COUNT` has the number of random moments. Two losses in a row are longer than one: the death
 /// may be found only after the next view change. If the proposal of the dying relay is decided by a spare that alone
