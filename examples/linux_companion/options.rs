@@ -209,7 +209,7 @@ pub(crate) struct BatteryOptions {
     /// Mean speed at which the autopilot descends to land, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 1.5, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
     descent: f32,
-    /// Wait outside of the chain as a spare until the leader calls this relay. Not for relay 1, and only with --shared
+    /// Wait outside of the chain as a spare until the leader calls this relay; only with --shared
     #[arg(long, requires = "shared")]
     pub(crate) spare: bool,
 }
@@ -362,11 +362,6 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         dead_after: Duration::from_millis(options.dead_after_ms),
         ..Settings::default()
     };
-    if options.battery.spare && index == mission.leader() {
-        return Err(format!(
-            "--spare: relay {index} is the first leader, which cannot wait as a spare"
-        ));
-    }
     let key = options.key_file.as_deref();
     let key = key.map(|file| key::load("--key-file", file));
     Ok(Plan {

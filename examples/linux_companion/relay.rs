@@ -101,9 +101,6 @@ impl Flight {
             .map_err(|error| error.to_string())?;
         let reserve = options.battery.reserve();
         relay.set_reserve(reserve);
-        if options.battery.spare {
-            relay.wait_as_spare(now);
-        }
         let file = options.upload_file.as_deref();
         let resumed =
             file.is_some_and(|file| records::resume_upload(file, &plan.mission, &mut relay, &log));
@@ -111,6 +108,10 @@ impl Flight {
         let views = options.view_file.as_deref();
         let views = views.map(|file| records::resume_views(file, &mut relay, now));
         let (mut views, has_votes) = views.transpose()?.unzip();
+        // After the view record: it shows if this relay has taken part in the chain.
+        if options.battery.spare {
+            relay.wait_as_spare(now);
+        }
         // This step is the last one that may fail, so that failed starts leave no files.
         if let Some(asked) = &options.capture {
             tap::attach(&log, env!("CARGO_BIN_NAME"), asked, ports.ttys())?;
