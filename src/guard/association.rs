@@ -327,12 +327,14 @@ impl Association {
 /// does not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Nearest lost node on this side, and the limit of this relay's x due to all lost nodes, m. `None` if no node is
-    /// lost.
-    lost: Option<(u16, f32)>,
-    /// Number of the nearest lost node whose x was known, and the x, m, that its drone is not nearer than. Number 0
-    /// without such a node.
-    known: (u16, f32),
+    /// Nearest lost node on this side, and the limit of this relay's x due to all lost nodes, m. The limit is NaN if no
+    /// node is lost.
+    lost: u16,
+    limit_m: f32,
+    /// Nearest lost node whose x was known, and the x, m, that its drone is not nearer than. The x is NaN without such a
+    /// node.
+    known: u16,
+    known_m: f32,
     /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if it is no closer now.
     /// Before this x, possibly only lateral offset and altitude keep this relay apart from the lost relay.
     near_m: f32,
@@ -346,39 +348,52 @@ pub(super) struct KeepOut {
 impl KeepOut {
     pub(super) const fn none() -> Self {
         Self {
-            lost: None,
-            known: (0, 0.0),
+            lost: 0,
+            limit_m: f32::NAN,
+            known: 0,
+            known_m: f32::NAN,
             near_m: f32::NAN,
             disordered: false,
             unflown: None,
         }
     }
 
-    pub(super) fn limit_m(&self) -> Option<f32> {
-        self.lost.map(|(_, limit_m)| limit_m)
+    /// Returns the limit of this relay's x due to lost relays, m. NaN if no relay is lost.
+    pub(super) const fn limit_m(&self) -> f32 {
+        self.limit_m
+    }
+
+    /// Returns true if a lost relay is an obstacle.
+    pub(super) const fn has_lost(&self) -> bool {
+        !self.limit_m.is_nan()
+    }
+
+    /// Returns true if `node` is nearer than the node `other` at `side`.
+    const fn is_nearer(side: Side, node: u16, other: u16) -> bool {
+        match side {
+            Side::Upstream => node > other,
+            Side::Downstream => node < other,
+        }
     }
 
     /// Adds a lost relay at `side` as an obstacle. The lost relay has the number `node`, and limits this relay's x to
     /// `limit_m`, m. If there already is a lost relay, the nearer node and the tighter limit are kept.
     #[inline(never)] // called from both sides
     pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32) {
-        let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
-        self.lost = Some(match side {
-            Side::Upstream => (nearest.max(node), tightest_m.max(limit_m)),
-            Side::Downstream => (nearest.min(node), tightest_m.min(limit_m)),
-        });
+        if !self.has_lost() || Self::is_nearer(side, node, self.lost) {
+            self.lost = node;
+        }
+        self.limit_m = match side {
+            Side::Upstream => self.limit_m.max(limit_m),
+            Side::Downstream => self.limit_m.min(limit_m),
+        };
     }
 
     /// Records that the drone of the lost relay `node` at `side` is no nearer than the x `x_m`. If there already is such
     /// a lost relay, the nearer node is kept.
     pub(super) const fn record_lost_x(&mut self, side: Side, node: u16, x_m: f32) {
-        let (known, _) = self.known;
-        let is_nearer = match side {
-            Side::Upstream => node > known,
-            Side::Downstream => node < known || known == 0,
-        };
-        if is_nearer {
-            self.known = (node, x_m);
+        if self.known_m.is_nan() || Self::is_nearer(side, node, self.known) {
+            (self.known, self.known_m) = (node, x_m);
         }
     }
 
@@ -387,13 +402,12 @@ impl KeepOut {
     /// The number of `node` is between that of this relay and that of the lost drone, so its x has to be between them,
     /// too, up to the errors of the reports. The new neighbour knows nothing of the lost drone.
     pub(super) fn bars(&self, side: Side, node: u16, x_m: f32, config: &GuardConfig) -> bool {
-        let (known, lost_m) = self.known;
-        let off_m = 2.0 * config.hover_m + config.rounding();
-        known != 0
-            && match side {
-                Side::Upstream => known < node && x_m < lost_m - off_m,
-                Side::Downstream => known > node && x_m > lost_m + off_m,
-            }
+        let beyond_m = match side {
+            Side::Upstream => self.known_m - x_m,
+            Side::Downstream => x_m - self.known_m,
+        };
+        Self::is_nearer(side, node, self.known)
+            && beyond_m > 2.0 * config.hover_m + config.rounding()
     }
 
     /// Removes obstacles on `side` after a message from `node`: this node, and nodes farther away. Those are no
@@ -404,11 +418,11 @@ impl KeepOut {
             Side::Upstream => lost <= node,
             Side::Downstream => lost >= node,
         };
-        if self.lost.is_some_and(|(lost, _)| is_beyond(lost)) {
+        if self.has_lost() && is_beyond(self.lost) {
             self.clear();
         }
-        if is_beyond(self.known.0) {
-            self.known = (0, 0.0);
+        if is_beyond(self.known) {
+            self.known_m = f32::NAN;
         }
         if self.unflown.is_some_and(|(unflown, _)| is_beyond(unflown)) {
             self.unflown = None;
@@ -440,7 +454,7 @@ impl KeepOut {
     ///
     /// It is `Lost` beside a lost drone, which the neighbour may have to pass, otherwise `Unheard`.
     pub(super) const fn unpaired_reason(&self) -> HoldReason {
-        if self.lost.is_some() {
+        if self.has_lost() {
             HoldReason::Lost
         } else {
             HoldReason::Unheard
@@ -498,9 +512,8 @@ impl KeepOut {
     /// No effect without a lost relay. The lost relays may hover anywhere beyond `x_m`. At x = `near_m` this relay has
     /// the separation from all of them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
-        if let Some((_, limit_m)) = &mut self.lost {
-            *limit_m = x_m;
-            self.near_m = near_m;
+        if self.has_lost() {
+            (self.limit_m, self.near_m) = (x_m, near_m);
         }
     }
 
@@ -525,12 +538,10 @@ impl KeepOut {
     /// `near_m`. `is_beyond` returns true if this relay is at or past the x in its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
-            if let Some((_, limit_m)) = &mut self.lost {
-                *limit_m = match side {
-                    Side::Upstream => limit_m.max(self.near_m),
-                    Side::Downstream => limit_m.min(self.near_m),
-                };
-            }
+            self.limit_m = match side {
+                Side::Upstream => self.limit_m.max(self.near_m),
+                Side::Downstream => self.limit_m.min(self.near_m),
+            };
             self.near_m = f32::NAN;
         }
     }
@@ -558,8 +569,7 @@ impl KeepOut {
             Side::Upstream => (0, limit_m + separation_m),
             Side::Downstream => (u16::MAX, limit_m - separation_m),
         };
-        self.lost = Some((nearest, limit_m));
-        self.near_m = near_m;
+        (self.lost, self.limit_m, self.near_m) = (nearest, limit_m, near_m);
     }
 }
 

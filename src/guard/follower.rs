@@ -191,7 +191,7 @@ impl FenceFollower {
             (false, 0) => own.reachable.setpoint_m,
             (false, _) => self.fence_m,
         };
-        granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
+        granted.max(self.keep_out.limit_m())
     }
 
     /// Returns true if the upstream side permits this relay to change its lateral offset and altitude.
@@ -312,10 +312,9 @@ impl FenceFollower {
             return Some(HoldReason::Order);
         }
         let target_m = own.target_m();
-        let limit = self.keep_out.limit_m();
         let stays = self.keep_out.is_near() && !own.has_agreed_cross_section();
         let bars = self.keep_out.blocks(own);
-        if stays || bars || limit.is_some_and(|limit| target_m < limit) {
+        if stays || bars || target_m < self.keep_out.limit_m() {
             return Some(
                 self.keep_out
                     .reason(self.association.node, HoldReason::Lost),

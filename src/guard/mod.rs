@@ -585,7 +585,7 @@ impl Guard {
             Side::Upstream => &self.follower.keep_out,
             Side::Downstream => &self.owner.keep_out,
         };
-        keep_out.limit_m().is_some()
+        keep_out.has_lost()
     }
 
     /// Returns the agreed position of the neighbour at `side`; `None` while it is unknown.

@@ -279,7 +279,7 @@ impl FenceOwner {
             (false, true) => self.follower_low_m - apart,
             (false, false) => own.reachable.setpoint_m,
         };
-        granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
+        granted.min(self.keep_out.limit_m())
     }
 
     /// Returns true if the downstream side permits this relay to change its lateral offset and altitude.
@@ -431,10 +431,9 @@ impl FenceOwner {
             return Some(HoldReason::Order);
         }
         let target_m = own.target_m();
-        let limit = self.keep_out.limit_m();
         let stays = self.keep_out.is_near() && !own.has_agreed_cross_section();
         let bars = self.keep_out.blocks(own);
-        if stays || bars || limit.is_some_and(|limit| target_m > limit) {
+        if stays || bars || target_m > self.keep_out.limit_m() {
             return Some(
                 self.keep_out
                     .reason(self.association.node, HoldReason::Lost),
