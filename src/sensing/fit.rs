@@ -28,12 +28,12 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error in the estimate of the error variance. The error counts as if this number of
-/// measured positions had shown it.
+/// Weight of the operator's expected error variance in the estimated error variance. The estimate is a weighted mean of
+/// the expected and the observed variance; the expected one counts like this number of measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance the
-/// measurements do not show on which side of the line Tx to Rx the source is.
+/// Minimum variance of the measured positions' lateral offsets y, in units of D / 2. D is the distance from Tx to Rx.
+/// With a smaller variance the measurements do not show on which side of the line Tx to Rx the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -44,7 +44,8 @@ pub struct FoundSource {
     pub source: Interferer,
     /// Variances of the source's estimated x and y, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source. If false, `source` is the closest source, and `variance_m2` is 0.
+    /// True if the measurements fit a single source. If false, `source` is the source whose interference is closest to
+    /// the measurements, and `variance_m2` is 0.
     pub is_one: bool,
 }
 
@@ -224,8 +225,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and a small variance. The variance must be below four
-    /// times the variance that the operator expects.
+    /// Returns true if the fit has more measured positions than unknowns, and its variance is small. The variance must
+    /// be below four times the variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -259,8 +260,8 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// If the measured positions do not determine on which side of their mean y the source is, the result is on the
-    /// side of `side_m`, a lateral offset y.
+    /// The measured positions may not determine if the y of the source is above or below their mean y. The source is
+    /// then on the same side of their mean y as `side_m`, a lateral offset, m.
     ///
     /// # Errors
     /// [`Unfit::NoSource`] if no source on the ground fits.

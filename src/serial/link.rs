@@ -9,7 +9,7 @@ use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
 
-/// Maximum number of bytes, and of failed reads, per poll and port.
+/// Maximum number of bytes read, and of failed reads, in one poll of a port.
 #[doc(hidden)] // public because the documentation of public functions links to it
 pub const READ_LIMIT: usize = 64;
 
@@ -167,7 +167,7 @@ pub(super) trait FrameLink {
     fn has_room(&self) -> bool;
     /// Queues a frame for sending. A frame that does not fit is dropped and counted.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame that is dropped because its port does not exist with this driver.
+    /// Counts a frame that is dropped because it is for a port that this driver does not have.
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);

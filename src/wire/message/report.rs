@@ -80,7 +80,7 @@ impl Entry {
     /// Creates an entry on a relay, whose state is `age` tenths of a second old.
     ///
     /// `relay` is the relay's number plus 1000 times the code of [`refusal`](Entry::refusal). `state` combines the
-    /// relay's phase, reasons to wait, control state and flags: see [`Entry::state`].
+    /// relay's phase, hold reasons, control state and flags: see [`Entry::state`].
     pub const fn new(relay: u16, age: u8, state: u16, at: Coarse) -> Self {
         Self {
             relay: Word::new(relay),
@@ -121,10 +121,9 @@ impl Entry {
         self.state.number()
     }
 
-    /// Returns the control state of the drone, from 1; 0 without an autopilot.
+    /// Returns the number of the drone's control state, from 1; 0 without an autopilot.
     ///
-    /// In the states from 3 on, the drone is in the air. These are in order: standby, engaged, blind, and engaged with
-    /// a refused setpoint.
+    /// In the states 3 to 6 the drone is in the air: 3 standby, 4 engaged, 5 blind, 6 engaged with a refused setpoint.
     #[doc(hidden)]
     pub const fn control(&self) -> u16 {
         self.state.number() / 4096 % 7
