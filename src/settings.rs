@@ -12,7 +12,7 @@ use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
 
-/// Part of the presets' `hop_time` for computation and link buffers. The presets are `Settings::wires` and
+/// Time for computation and link buffers that the presets include in `hop_time`. The presets are `Settings::wires` and
 /// `Settings::radio`.
 const LATENCY: Duration = Duration::from_millis(10);
 
@@ -168,8 +168,8 @@ pub struct Settings {
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
-    /// mission without Tx and Rx positions is then rejected if its distance differs from that of the surveyed ones. Set
-    /// it on all relays of a chain, or on none.
+    /// mission without Tx and Rx positions is then rejected if its distance from Tx to Rx differs from the distance
+    /// between the surveyed positions. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 

@@ -44,8 +44,8 @@ pub struct Stats {
     /// Received pass messages (messages along the chain) from the wrong neighbour. A pass message must come from the
     /// previous relay of the pass, and a reply from the next relay of the pass.
     pub misdirected: u32,
-    /// Ignored messages for a mission other than this relay's, and offered missions that it refuses. The events are
-    /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
+    /// Ignored messages for a mission other than this relay's, and offered missions that the relay refuses. The events
+    /// are [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
     /// Ignored view changes and pass messages (messages along the chain) with a wrong digest. The digest must be that

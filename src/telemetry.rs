@@ -42,7 +42,7 @@ pub struct Report {
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a position that is not the setpoint sent by the relay.
     pub refuses_setpoint: bool,
-    /// Number of the nearest node that the relay ignores because it has a different mission. `None` for none.
+    /// Number of the nearest node with a different mission, which the relay ignores. `None` for none.
     pub other_mission: Option<u16>,
     /// Number of the nearest node whose last handshakes were not made with the relay's key. `None` for none.
     pub other_key: Option<u16>,

@@ -131,8 +131,8 @@ impl Hop {
     }
 
     /// Creates the hop from `sender` to a receiver whose x is at most `end_m`. The hop has no minimum length. `at` is
-    /// the receiver's lateral offset and altitude. `noise` is the noise divided by the interferer's power received at 1
-    /// m, 1/m^2.
+    /// the receiver's lateral offset and altitude. `noise` is the noise divided by the interferer's power received at
+    /// one metre, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,

@@ -63,7 +63,8 @@ pub(super) struct Endurance {
     /// made or withdrawn; the margin is at or below the floor (where `AtReserve` is raised); the leader has to receive
     /// a changed request; the margin is at least [`STEP`] above the floor.
     since: [Instant; 4],
-    /// True if this module has made the request to leave; false if the firmware has made it.
+    /// True if the relay itself has requested to leave, because of its endurance. False if the firmware has made the
+    /// request.
     is_own: bool,
     /// True from a margin at or below the floor until the margin is [`STEP`] above the floor. The margin is the
     /// remaining flight time minus the way home, the floor the margin at which `AtReserve` is raised.
@@ -71,7 +72,8 @@ pub(super) struct Endurance {
     /// True if the drone landed at its reserve, or while this module had requested to leave. It becomes false once the
     /// relay no longer requests to leave, or the margin (flight time minus way home) is [`STEP`] above the floor.
     keeps_out: bool,
-    /// Time at which only the way home and the reserve will be left, as last sent to the leader.
+    /// Time at which the remaining flight time will be only the way home and the reserve. The value is the one last
+    /// sent to the leader.
     floor_at: Instant,
     reviewed_at: Instant,
 }

@@ -710,9 +710,9 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Records whether the drone flies to the setpoints (`flown`). See [`handle_control`](Self::handle_control).
+    /// Records if the drone flies to the setpoints (`flown`). See [`handle_control`](Self::handle_control).
     ///
-    /// Returns true if this changes the state of the guard (collision avoidance).
+    /// Returns true if the call changes the state of the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         let now = self.clock.advance(now);
         self.review_endurance(now, flown);

@@ -96,7 +96,7 @@ enum Stage {
     Trying(u16),
     /// Notice: a sensing pass that tells the faulty node, which has this number, that it is excluded.
     ///
-    /// There are two such passes. The flag is false in the first pass, whose measurements are discarded. The flag is
+    /// There are two such passes. The second value is false in the first pass, whose measurements are discarded. It is
     /// true in the second pass, whose measurements are used for the estimate.
     Announcing(u16, bool),
 }

@@ -127,8 +127,8 @@ const LOUDER: f64 = 0.025;
 /// of the fit. With a larger difference the position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
-/// measured positions divided by the error variance of one position.
+/// Minimum factor by which the information must have grown before a refined estimate is adopted. Information is the
+/// number of measured positions divided by the error variance of one position.
 const LEARNED: f64 = 1.1;
 /// Number of times that the estimate of a stationary interferer is refined. Then the estimate stays until the
 /// interference changes.
@@ -153,7 +153,7 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Expected mean square of the relative error of the current estimate's interference.
     chance: f64,
-    /// Number of estimates adopted for the same interferer, up to [`REFINED`].
+    /// Number of times that the estimate of the same interferer has been replaced, up to [`REFINED`].
     refined: u8,
     track: Track,
 }
@@ -462,8 +462,8 @@ impl Axis {
         }
     }
 
-    /// Advances position and velocity by `seconds`. The variance of the velocity grows by `walk` per second, in
-    /// m^2/s^3.
+    /// Predicts position and velocity for a time `seconds` later. The variance of the velocity grows by `walk` per
+    /// second; the unit of `walk` is m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
         let [at, both, speed] = &mut self.variance;

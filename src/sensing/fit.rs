@@ -191,7 +191,8 @@ impl Fit {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "checked")]
-    /// Returns the most likely power of a source at (`x_m`, `y_m`), W; `None` outside of 1e-6 to 1e9 W.
+    /// Returns the most likely power, W, of a source at (`x_m`, `y_m`), given the measurements. `None` if the power is
+    /// outside of 1e-6 to 1e9 W.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {
             power_w: mission.config().common.power_w,
@@ -433,7 +434,7 @@ impl Best<'_> {
 mod tests {
     use super::Factor;
 
-    /// Symmetric matrix of the fit for four positions that differ in all terms. Its rows are linearly independent.
+    /// Symmetric matrix of the fit for four measured positions. Its rows are linearly independent.
     const MATRIX: [[f64; 4]; 4] = [
         [4.0, 0.6, 1.1, -0.7],
         [0.6, 3.0, -0.4, 0.9],

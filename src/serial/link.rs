@@ -16,7 +16,8 @@ pub const READ_LIMIT: usize = 64;
 /// Capacity of the transmit queue, bytes: the frame that the port is sending, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
 
-/// Maximum pause between attempts to write to a port that accepts no bytes, in byte times.
+/// Maximum pause between attempts to write to a port that accepts no bytes. The unit is the transmission time of a
+/// byte.
 const LONGEST_PAUSE: u32 = 128;
 
 /// Placeholder type for a link without a driver-enable pin. Such a link is full duplex, or its radio switches between

@@ -54,8 +54,9 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit of a claim number, set by a relay that has a position when a second node uses its node number. This bit makes
-/// the relay's claim number the larger one. The node with the larger claim number keeps the node number.
+/// Bit of a claim number, set by a relay that has a position when a second node uses its node number. The claim number
+/// is then larger than any claim number without this bit. Of two nodes with the same number, the one with the larger
+/// claim number keeps the node number.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -95,8 +96,8 @@ struct Peer {
     older: OlderHandshakes,
 }
 
-/// Counts consecutive handshakes of a node with an outdated nonce. Several of them show that the node's epoch went
-/// back, or that the node restarted in the same epoch.
+/// Counter of consecutive handshakes of a node with an outdated nonce. Several such handshakes show that the node's
+/// epoch went back, or that the node restarted in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,

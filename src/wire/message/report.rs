@@ -107,8 +107,8 @@ impl Entry {
 
     /// Returns direction and distance of the nearest node that the relay refuses; 0 for none.
     ///
-    /// 1 to 4: another mission, at a node that many numbers toward Tx. 5 to 8: another mission, 1 to 4 numbers toward
-    /// Rx. 9 to 16: the same for another key.
+    /// 1 to 4: another mission, at a node whose number is smaller by 1 to 4 (toward Tx). 5 to 8: another mission, at a
+    /// node whose number is larger by 1 to 4 (toward Rx). 9 to 16: the same for another key.
     pub const fn refusal(&self) -> u16 {
         self.relay.number().saturating_sub(1) / MAX_RELAYS
     }

@@ -141,7 +141,7 @@ pub struct SweepVerdict {
     /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Result of the sweep: the target that the chain commits to, if any, and the slack for each target. The slack is
-    /// the maximum length of a chain that meets the target, less the distance from Tx to Rx.
+    /// the maximum length of a chain that meets the target, minus the distance from Tx to Rx.
     pub verdict: Verdict,
     /// x to which the destination of this reply must move if a target is committed, m. If it is `None`, the destination
     /// takes the farthest x that it sent for this target in its sweep message.
