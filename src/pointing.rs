@@ -12,7 +12,8 @@ use crate::place::Placement;
 /// Direction and distance of a position relative to a relay.
 ///
 /// Frame: x toward the receiver, y to the right for an observer who looks along x, h up. So the frame is left-handed,
-/// as in the paper, and azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
+/// as in the paper, and azimuth grows clockwise. The direction that the two angles give has an error of at most 0.23
+/// degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {
@@ -44,7 +45,7 @@ impl Bearing {
         })
     }
 
-    /// Returns the bearing of `to` seen from `from`; `None` if both are equal.
+    /// Returns the bearing of `to` seen from `from`; `None` if the two positions are equal.
     ///
     /// The ground stations are placements too, at altitude 0.
     ///

@@ -34,8 +34,8 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// The ends enclose the number up to which `holds` returns true. `holds` must return true for `low` and false for
-/// `high`.
+/// `holds` must return true for `low` and false for `high`. There is then a limit up to which `holds` returns true; the
+/// returned ends enclose this limit.
 pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bool) -> (f32, f32) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {
@@ -82,13 +82,14 @@ impl PowerRatio {
         f64::from(self.hi) + f64::from(self.lo)
     }
 
-    /// Returns `target` / A, rounded to f32. `target` is a target SIR, and A this ratio, the gain of a hop.
+    /// Returns `target` divided by this ratio, rounded to f32. The ratio is the gain A of a hop, `target` is a target
+    /// SIR.
     pub const fn ratio(self, target: f32) -> f32 {
         target / self.hi
     }
 
-    /// Returns `target` / A - 1. `target` is a target SIR, and A this ratio, the gain of a hop. The relative error is
-    /// below 2e-7, even if `target` is nearly A.
+    /// Returns `target` divided by this ratio, minus 1. The ratio is the gain A of a hop, `target` is a target SIR. The
+    /// relative error is below 2e-7, even if `target` is nearly A.
     pub const fn excess(self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
     }

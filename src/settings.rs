@@ -12,7 +12,7 @@ use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
 
-/// Part of the presets' `hop_time` for computation and link buffers. The presets are `Settings::wires` and
+/// Time for computation and link buffers that the presets include in `hop_time`. The presets are `Settings::wires` and
 /// `Settings::radio`.
 const LATENCY: Duration = Duration::from_millis(10);
 
@@ -116,8 +116,8 @@ pub struct Settings {
     pub profile: Option<Profile>,
     /// True to keep this relay's altitude fixed, although the method optimises altitudes.
     pub hold_altitude: bool,
-    /// Method that the leader runs; the other relays follow. The leader is relay 1, or relay N if the mission gives
-    /// the interference as a distribution along x.
+    /// Method that the leader runs; the other relays act on the leader's messages. The leader is relay 1, or relay N if
+    /// the mission gives the interference as a distribution along x.
     pub method: Method,
     /// Measurement of the interference by this relay; `None` for no measurement. The measured interference replaces
     /// the distribution along x that the mission gives. Use `None` if the mission gives no such distribution.
@@ -125,7 +125,7 @@ pub struct Settings {
     /// Estimation of an unknown interferer from measurements; `None` for no estimation. Use `None` if the mission gives
     /// the interference as a distribution along x. Set it on all relays of a chain, or on none.
     pub listen: Option<Listen>,
-    /// Schedule of target SIRs that the leader tries; the other relays follow.
+    /// Schedule by which the leader tries target SIRs; the other relays act on the leader's messages.
     pub schedule: Schedule,
     /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is correct, one
     /// round trip of messages along the chain is enough. This setting has an effect only with the bracketed schedule.
@@ -138,14 +138,14 @@ pub struct Settings {
     /// Maximum time from `poll_transmit` at one relay to `poll_transmit` at the next relay; above 0. The time is for
     /// a message of 100 bytes (a sweep), and includes the computation. For longer messages it is scaled up.
     pub hop_time: Duration,
-    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. This relay sends 16 requests
-    /// until `dead_after`, and more on a channel that loses frames.
+    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. Between `probe_after` and
+    /// `dead_after` this relay sends 16 requests, and more on a channel that loses frames.
     pub probe_after: Duration,
     /// Minimum silence after which a neighbour counts as lost, and minimum duration of a lease. Above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of a split chain needs a quorum to continue. A quorum is more than half of the previous view's
-    /// members, or exactly half including the view's proposer. Without this rule, the parts of a split chain would
-    /// interfere with each other.
+    /// True if the relays need a quorum to continue after the chain has split. A quorum is more than half of the
+    /// members of the last agreed view (list of members), or exactly half including the proposer of that view. Without
+    /// this rule, the parts of a split chain would interfere with each other.
     pub quorum: bool,
     /// Behaviour of the relay while too few relays are reachable for a quorum.
     pub without_quorum: WithoutQuorum,
@@ -162,14 +162,14 @@ pub struct Settings {
     /// chain, at most four times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
-    /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
-    /// its drone, which still waits at its position. At an end of the chain, a neighbour comes within a few metres of
-    /// it.
+    /// True if a relay without a guard (collision avoidance) is allowed to leave (`Relay::leave`). The neighbours of
+    /// the leaving relay then fly close to its drone, which still waits at its position. If that relay is the first or
+    /// the last of the chain, a neighbour comes within a few metres of it.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
-    /// mission without Tx and Rx positions is then rejected if its distance differs from that of the surveyed ones. Set
-    /// it on all relays of a chain, or on none.
+    /// mission without Tx and Rx positions is then rejected if its distance from Tx to Rx differs from the distance
+    /// between the surveyed positions. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 

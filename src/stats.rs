@@ -27,8 +27,8 @@ pub struct Stats {
     pub version: u32,
     /// Received handshake frames with the right authentication tag. Handshakes only establish sessions.
     pub handshakes: u32,
-    /// Received intact frames without an authentication tag, if this relay has a key. If it has no key: received
-    /// mission offers, because offers are accepted only with a key.
+    /// Received intact frames without an authentication tag, if this relay has a key. Without a key: received offers of
+    /// a mission, because a relay accepts an offered mission only with a key.
     pub unsigned: u32,
     /// Intact frames with a wrong authentication tag: sent without the key, altered, or of an old epoch.
     pub forged: u32,
@@ -41,19 +41,20 @@ pub struct Stats {
     /// Received intact frames from a node that is no neighbour. On a point-to-point link also frames that are not
     /// addressed to this relay.
     pub misaddressed: u32,
-    /// Received messages of passes from the wrong neighbour. A pass must come from the previous relay of the pass, and
-    /// a reply from the next one.
+    /// Received pass messages (messages along the chain) from the wrong neighbour. A pass message must come from the
+    /// previous relay of the pass, and a reply from the next relay of the pass.
     pub misdirected: u32,
-    /// Ignored messages of a mission that is not this relay's, and offers of a mission that it refuses. The events are
-    /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
+    /// Ignored messages for a mission other than this relay's, and offered missions that the relay refuses. The events
+    /// are [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Ignored view changes and pass messages whose digest is not that of this relay's view and mission.
+    /// Ignored view changes and pass messages (messages along the chain) with a wrong digest. The digest must be that
+    /// of this relay's view and mission.
     pub view: u32,
     /// Views (agreements on the chain's members) that this relay has accepted.
     pub views: u32,
-    /// Ignored outdated messages, for example of a view change that has ended. Mission offers that this relay has not
-    /// requested by a recent hello also count here.
+    /// Ignored outdated messages, for example of a view change that has ended. An offered mission also counts here if
+    /// this relay has not requested it by a recent hello message.
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or while this relay measures nothing.
     pub samples_rejected: u32,

@@ -10,12 +10,12 @@ use crate::wire::message::{Coarse, Detail, Entry};
 
 /// State that a relay has reported to the ground station through the chain.
 ///
-/// In a pair, the first value is for the neighbour toward Tx, the second for the neighbour toward Rx.
+/// In a field with two values, the first value is for the neighbour toward Tx, the second for the neighbour toward Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Report {
     /// Number of the relay in the mission, from 1 (next to Tx) to N.
     pub relay: u16,
-    /// Time at which the relay was in this state, on the station's clock.
+    /// Time at which the relay was in the reported state, on the ground station's clock.
     pub at: Instant,
     /// Position of the drone by its autopilot; `None` if the autopilot has no position.
     pub position: Option<Placement>,
@@ -37,13 +37,14 @@ pub struct Report {
     pub neighbours: [Option<u16>; 2],
     /// Flags for the neighbours toward Tx and toward Rx: true if the relay does not receive it now.
     pub silent: [bool; 2],
-    /// True if a second node with this relay's number was received in the last three times `dead_after`.
+    /// True if the relay has recently received a second node with its own number. Recently means within three times the
+    /// setting `dead_after`.
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a position that is not the setpoint sent by the relay.
     pub refuses_setpoint: bool,
-    /// Number of the nearest node that the relay ignores because their missions differ; `None` for none.
+    /// Number of the nearest node with a different mission, which the relay ignores. `None` for none.
     pub other_mission: Option<u16>,
-    /// Number of the nearest node whose last handshakes do not have the relay's key; `None` for none.
+    /// Number of the nearest node whose last handshakes were not made with the relay's key. `None` for none.
     pub other_key: Option<u16>,
     /// Interference power last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
@@ -73,7 +74,8 @@ const CONTROLS: [State; 6] = [
     State::Engaged,
 ];
 
-/// Number of a control state. The relay controls the drone, but the autopilot does not fly to the setpoint.
+/// Number of the control state in which the autopilot does not fly to the setpoint. The relay controls the drone, but
+/// the autopilot refuses the setpoint.
 pub(crate) const REFUSED: u16 = 6;
 
 /// Hold reasons in the order of their numbers in a report, from 1.
@@ -87,9 +89,10 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the number of the node whose messages the relay of this entry ignores; `None` for none.
+/// Returns the number of the node that the relay in `entry` ignores; `None` for none.
 ///
-/// `first` is 1 to ask for a different mission as the reason, and 9 for a different key.
+/// Only one reason is considered: a different mission if `first` is 1, a different key if `first` is 9. `first` is the
+/// lowest code of this reason in the entry.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),
@@ -104,7 +107,8 @@ fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
 }
 
 impl Report {
-    /// Creates the report of one relay from its state `entry` at the time `at`, and its last `detail`.
+    /// Creates the report of one relay from `entry`, its state at the time `at`. `detail` has further values of the
+    /// relay, as last received; `None` without such values.
     ///
     /// Not part of the public interface: tests and tools of this workspace decode captures with it.
     #[doc(hidden)]

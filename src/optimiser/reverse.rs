@@ -34,7 +34,6 @@
 //! problem of the [last hop](super::from_rx), with x in place of Rx. On that branch F_k / gamma = (A r / A') q(s) /
 //! q(s0), and without noise, at equal altitudes, with c^2 = A' / (r gamma) and the angle v between the directions from
 //! the sender to the interferer and to the receiver
-//! the directions from the sender to the interferer and to the receiver
 //!
 //! ```text
 //! s / s0 = 1 + c^2 - 2 c cos v

@@ -47,19 +47,19 @@ use crate::place::{CrossSection, Station};
 use crate::root::{bisected, sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Position that the previous relay must take so that this relay's hop meets the target SIR.
+/// Position that a relay must take so that the next hop of the pass meets the target SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// Requirement that the previous node takes its farthest x that meets the target. Also for Tx and Rx as the
-    /// previous node, although they cannot move.
+    /// Farthest x of the relay in the direction of the pass that still meets the target SIR. This value is also used
+    /// for Tx and Rx, which cannot move.
     AtReach,
-    /// Requirement that the previous relay takes this x, m. It is not the farthest x that meets the target.
+    /// Given x of the relay, m. It differs from the farthest x that meets the target SIR.
     At(f32),
 }
 
 impl RequiredPosition {
-    /// Returns the required x of the previous relay, m. `reach_m` is its farthest x that meets the target.
+    /// Returns the required x of the relay, m. `reach_m` is the relay's farthest x that meets the target SIR.
     pub(crate) const fn or_reach(self, reach_m: f32) -> f32 {
         match self {
             Self::AtReach => reach_m,
@@ -68,12 +68,12 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared for many targets. To compute its maximum length for a target takes three divisions and a
-/// square root.
+/// Hop toward Rx, with the terms of the equations that are the same for all target SIRs. The maximum length of the hop
+/// for one target then takes three divisions and a square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
-    /// Position X of the interferer along x, m.
+    /// Coordinate X of the interferer along the line from Tx to Rx, m.
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
@@ -93,8 +93,8 @@ pub struct Hop {
     from_tx: bool,
     /// Largest permitted x of this hop's receiver, m; Tx is at x = 0.
     end_m: f32,
-    /// Maximum x of the receiver, and maximum x of the sender, m. Each of them leaves the relays nearer to Rx space for
-    /// their minimum separation.
+    /// Largest x of the receiver, and largest x of the sender, m, in this order. Beyond these limits, the relays nearer
+    /// to Rx would have too little space for their minimum separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a mission without data from Rx to Tx.
     back: Option<Back>,
@@ -104,7 +104,7 @@ impl Hop {
     /// Creates the hop from `sender` to relay `index`, which has the lateral offset and altitude `at`.
     ///
     /// `spread_squared`, m^2, is the largest squared distance, perpendicular to x, between two neighbours among the
-    /// relays after `index`.
+    /// relays nearer to Rx than relay `index`.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -130,9 +130,9 @@ impl Hop {
         }
     }
 
-    /// Creates the hop from `sender` to a receiver at an x up to `end_m`. `at` is the receiver's lateral offset and
-    /// altitude. The hop has no minimum length. `noise` is the noise divided by the interferer's power received at
-    /// 1 m, 1/m^2.
+    /// Creates the hop from `sender` to a receiver whose x is at most `end_m`. The hop has no minimum length. `at` is
+    /// the receiver's lateral offset and altitude. `noise` is the noise divided by the interferer's power received at
+    /// one metre, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -162,8 +162,8 @@ impl Hop {
         if REVERSE { self.back.as_ref() } else { None }
     }
 
-    /// Returns this hop together with the backward hop, if the mission has data from Rx to Tx. `power_w` is the power
-    /// of the relay that receives this hop and sends the backward hop, W.
+    /// Returns this hop and, if the mission has data from Rx to Tx, also the backward hop. `power_w` is the transmit
+    /// power, W, of the relay that receives the forward hop (toward Rx) and sends the backward hop.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {
@@ -172,8 +172,8 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a receiver at any x up to the x of Rx. The hop then leaves no space along x for the relays
-    /// nearer to Rx.
+    /// Returns this hop with the x of Rx as the limit of the receiver's x. This limit leaves no space along x for the
+    /// relays nearer to Rx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -185,12 +185,11 @@ impl Hop {
         Self { end_m, ..self }
     }
 
-    /// Returns the largest x from `from_m` to the hop's limit at which the receiver meets `target`, m. `None` if there
-    /// is none.
+    /// Returns the largest x, m, at which the receiver meets `target`; `None` if there is no such x.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to the x of Rx. The result is rounded
-    /// toward the sender, so it meets the target as an f32. Constant work; with noise at most 96 evaluations of the
-    /// hop, usually five.
+    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to the x of Rx. The result is between
+    /// `from_m` and the largest permitted x of the receiver. It is rounded toward the sender, so it meets the target as
+    /// an f32. Constant work; with noise at most 96 evaluations of the SIR, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_simple() {
             self.in_silence(target, from_m)
@@ -262,11 +261,12 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`].
-    /// `None` if no x meets `target`.
+    /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`]. `None` if no x
+    /// meets `target`.
     ///
-    /// If the receiver has such a position for a sender at `from_m`, separated from it, the result is [`Hop::reach`]
-    /// for this sender. Otherwise the sender is before the receiver by their minimum distance along x. Constant work.
+    /// If the hop can meet `target` with the sender at `from_m`, the result is [`Hop::reach`] for this sender, or more
+    /// for data in both directions. Otherwise the sender is before the receiver by their minimum distance along x.
+    /// Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self
             .reach(target, from_m)
@@ -278,8 +278,8 @@ impl Hop {
     }
 
     /// Returns the receiver's largest x, m, at which the hop meets `target` in both directions of data. The sender is
-    /// in [0, `from_m`], and receives `back`, the backward hop. `place` is the receiver's largest x for a sender at
-    /// `from_m`. The result is larger if a smaller x of the sender gives the backward hop a better SIR.
+    /// at any x from 0 to `from_m`. `back` is the hop from the receiver back to it. `place` is the receiver's largest x
+    /// for a sender at `from_m`. The result is larger if a smaller x of the sender gives the backward hop a better SIR.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -299,8 +299,9 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x, m, at which the hop meets `target` in both directions of data. The result is at
-    /// most `near`. `None` if there is none. The receiver is at x = `place`.
+    /// Returns the sender's largest x, m, at which the hop meets `target` in both directions of data. Only x up to
+    /// `near` are considered; `None` if no such x meets `target`. The receiver is at x = `place`. `back` is the hop
+    /// from the receiver back to the sender.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -363,8 +364,8 @@ impl Hop {
     /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if no permitted
     /// position of the sender meets `target`.
     ///
-    /// `from_m` is the sender's farthest x that meets `target`. The required position is the permitted position
-    /// closest to the receiver, because it has the best SIR.
+    /// `from_m` is the farthest x at which the sender itself, as a receiver, meets `target`. The required position is
+    /// the permitted position closest to the receiver, because the hop from there has the best SIR.
     pub fn required_position(
         &self,
         target: f32,
@@ -409,8 +410,8 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, without a minimum separation. So the result is a
-    /// smooth function, as the joint method requires.
+    /// Returns the receiver's largest x, m, that meets `target` if no minimum separation is required. Without a minimum
+    /// separation the result is a smooth function of the arguments, as the joint method requires.
     ///
     /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance perpendicular to
     /// x alone exceeds the hop's maximum length.
@@ -464,7 +465,7 @@ impl Hop {
     }
 }
 
-/// Relative tolerance on a hop's SIR, for rounding errors, in the check of a position.
+/// Relative tolerance for rounding errors in the comparison of a hop's SIR with its target.
 const ROUNDING: f32 = 4e-6;
 
 /// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the result equals `from_m`: two relays must not have
@@ -487,9 +488,9 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 /// Returns the paper's `d_max`, m: the largest distance along x at which a relay meets `target` at Rx.
 ///
 /// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared distance),
-/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if a relay vertically above the receiver
-/// is too weak, too. The result can exceed the distance from Tx to Rx. So it is a smooth function of the target, as the
-/// root search requires.
+/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay vertically above Rx does
+/// not meet `target`. The result can exceed the distance from Tx to Rx, so that it is a smooth function of the target,
+/// as the root search requires.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
@@ -512,8 +513,8 @@ impl Hop {
         if NOISE { self.noise } else { 0.0 }
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m: [`Hop::reach`] for a hop with noise. `None` if
-    /// no x meets `target`.
+    /// Returns the largest x, m, at which the receiver meets `target`, for a hop with receiver noise. `None` if no x
+    /// meets `target`.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;

@@ -16,22 +16,24 @@ const STALE: Duration = Duration::from_millis(10_000);
 /// Maximum time between two comparisons of the margin with its limit. The margin is the drone's remaining flight time minus the time of the
 /// way home.
 const REVIEW: Duration = Duration::from_millis(1_000);
-/// Time for which a condition must hold before it causes an action.
+/// Time for which a condition of the endurance must hold before the relay acts on it.
 const HOLD: Duration = Duration::from_millis(15_000);
-/// Hysteresis in the comparison of the margin with its limits. Also the maximum difference of two endurance values that
-/// agree, and the minimum change of a request that is sent to the leader.
+/// Hysteresis in the comparison of the margin (remaining flight time minus way home) with its limits. Two successive
+/// endurance values that differ by less confirm each other. A relay that requests to leave repeats the request to the
+/// leader if the end of the flight has moved by at least this time.
 const STEP: Duration = Duration::from_millis(30_000);
 /// Minimum time between two events `EnduranceUnknown`, and between two events `AtReserve`.
 const AGAIN: Duration = Duration::from_millis(60_000);
-/// Usual duration of the replacement of a drone, in units of `dead_after`.
+/// Usual duration of the replacement of a drone, in units of the setting `dead_after`.
 ///
-/// The leader's order to leave comes after 8 units. After 4 more units, the other relays are in place, in a view (list
-/// of members) without this relay.
+/// The leader orders the relay to leave after 8 units. After 4 more units, the remaining relays have agreed on a view
+/// (list of members) without this relay, and have reached their new positions.
 const REPLACEMENT: u32 = 12;
-/// Maximum value of the time for a drone's replacement in the limit of the margin. The margin is the remaining flight
-/// time minus the time of the way home.
+/// Maximum time that the relay allows for a drone's replacement. The relay requests to leave once the remaining flight
+/// time is below the sum of the way home, the reserve and the time for the replacement.
 const LONGEST: Duration = Duration::from_millis(240_000);
-/// Maximum interval at which the pilots of drones with equal endurance are told to leave, one by one.
+/// Maximum time between `AtReserve` at one relay and at the next, for drones of equal endurance. It applies unless a
+/// departure is impossible by the settings.
 const APART: Duration = Duration::from_millis(10_000);
 /// Maximum valid flight time and way home, s. A larger value counts as unknown, because no multicopter flies longer.
 const MAX_S: f32 = 21_600.0;
@@ -41,34 +43,37 @@ const MAX_S: f32 = 21_600.0;
 pub(super) struct Endurance {
     /// Flight time to keep in addition to the way home; `None` if only the firmware requests to leave.
     reserve: Option<Duration>,
-    /// End of the drone's flight time, and time of its way home, both from the last valid value. `None` before a valid
-    /// value.
+    /// Time at which the drone's flight time ends, and duration of the way home, from the last valid value. `None`
+    /// before a valid value.
     end: Option<(Instant, Duration)>,
     /// Time at which the relay received the last valid value.
     sampled_at: Instant,
-    /// Last end of the flight that agreed with the value before it, within [`STEP`]. 0 if no value has agreed since the
-    /// last 10 s without a value.
+    /// Last computed end of the flight that two successive endurance values have confirmed. The two values differed by
+    /// less than [`STEP`]. 0 if no value was confirmed since the last 10 s without a value.
     confirmed: Instant,
     /// True from the time at which the endurance becomes unknown to the next valid value.
     is_lost: bool,
     losses: u32,
     /// Times of the last events `EnduranceUnknown` and `AtReserve`; 0 before the first event.
     raised_at: [Instant; 2],
-    /// Limit of the margin that `Relay::stay` has set; `None` to use the usual limit.
+    /// Margin below which the relay requests to leave, as `Relay::stay` has set it. `None` for the usual limit. The
+    /// margin is the remaining flight time minus the time of the way home.
     limit: Option<Instant>,
     /// Start times of four conditions; 0 for a condition that does not hold. In order: a request to leave has to be
-    /// made or withdrawn; the margin is at the floor; the leader has to receive a changed request; the margin is
-    /// clearly above the floor.
+    /// made or withdrawn; the margin is at or below the floor (where `AtReserve` is raised); the leader has to receive
+    /// a changed request; the margin is at least [`STEP`] above the floor.
     since: [Instant; 4],
-    /// True if this module has made the request to leave; false if the firmware has made it.
+    /// True if the relay itself has requested to leave, because of its endurance. False if the firmware has made the
+    /// request.
     is_own: bool,
-    /// True from a margin at or below the floor until the margin is [`STEP`] above the floor. The floor is the margin at which `AtReserve`
-    /// is raised.
+    /// True from a margin at or below the floor until the margin is [`STEP`] above the floor. The margin is the
+    /// remaining flight time minus the way home, the floor the margin at which `AtReserve` is raised.
     is_spent: bool,
-    /// True after a landing of the drone, either at the reserve or with this module's request to leave. False again
-    /// once there is no request, or the margin is [`STEP`] above the floor.
+    /// True if the drone landed at its reserve, or while this module had requested to leave. It becomes false once the
+    /// relay no longer requests to leave, or the margin (flight time minus way home) is [`STEP`] above the floor.
     keeps_out: bool,
-    /// Time at which only the way home and the reserve will be left, as last sent to the leader.
+    /// Time at which the remaining flight time will be only the way home and the reserve. The value is the one last
+    /// sent to the leader.
     floor_at: Instant,
     reviewed_at: Instant,
 }
@@ -106,7 +111,8 @@ impl Endurance {
         Some(Instant::ZERO + end.since(now + home))
     }
 
-    /// Records that the endurance is unknown, and counts this. With a reserve it also raises the event `EnduranceUnknown`.
+    /// Records that the endurance is unknown, and counts this loss of the endurance value. With a reserve it also
+    /// raises the event `EnduranceUnknown`.
     fn lose(&mut self, now: Instant, node: &mut Node) {
         if !core::mem::replace(&mut self.is_lost, true) {
             bump(&mut self.losses);
@@ -127,7 +133,8 @@ impl Endurance {
         }
     }
 
-    /// Records if the condition with the index `which` holds (`is_true`). Returns true once it decides: it must hold for 15 s.
+    /// Records if the condition with the index `which` holds now (`is_true`) and has held for long enough. Returns true
+    /// after it has held for 15 s without a break, so that the relay can act on it.
     ///
     /// A single endurance value is not enough: another value must agree with it, or a value must be received after the
     /// condition began. Exception: if `is_low` is true, a single value is enough once it is [`STALE`].
@@ -142,8 +149,9 @@ impl Endurance {
         is_true && now.since(at) >= HOLD && (is_sure || at < self.sampled_at)
     }
 
-    /// Compares the margin with its limit and its floor. At the floor, `AtReserve` is raised. Requests to leave below
-    /// the limit, or withdraws this request.
+    /// Makes or withdraws the request to leave, and raises `AtReserve`, according to the margin. The margin is the
+    /// remaining flight time minus the way home. The request is made below the limit of the margin; the event is raised
+    /// at a lower margin, the floor.
     fn review(&mut self, now: Instant, node: &mut Node) {
         if self.end.is_some() && self.is_old(now) {
             self.lose(now, node);
@@ -219,7 +227,8 @@ fn seconds(span: Duration) -> u16 {
 impl Relay {
     /// Records the drone's remaining time of flight and the time of its way home, s, 0 to 21 600.
     ///
-    /// Needs the feature `departures`. The endurance is unknown after another value, such as NaN, and after 10 s without a call.
+    /// Needs the feature `departures`. A value out of this range, such as NaN, makes the endurance unknown, and so does
+    /// a pause of 10 s without a call.
     ///
     /// With a reserve ([`set_reserve`](Self::set_reserve)) the relay requests to leave by itself below
     /// [`endurance_limit_s`](Self::endurance_limit_s), as with [`leave`](Self::leave). The rules are in
@@ -323,8 +332,9 @@ impl Relay {
         }
     }
 
-    /// Records that the firmware has called `stay` (`stays` is true) or `leave`. After `stay` the limit of the margin is at most half of
-    /// the present margin.
+    /// Records that the firmware has called `stay` (`stays` is true) or `leave`. After `stay`, the relay requests to
+    /// leave only once the margin is below half of its present value. The margin is the remaining flight time minus the
+    /// way home.
     pub(super) fn override_endurance(&mut self, now: Instant, stays: bool) {
         if let Some(endurance) = self.endurance.first_mut() {
             let limit = endurance.limit(&self.node.member().settings);
@@ -336,8 +346,8 @@ impl Relay {
         }
     }
 
-    /// Compares the margin of the endurance with its limit. While the drone follows the setpoints (`flown`), it also reports an unknown
-    /// endurance.
+    /// Compares the remaining flight time with the time at which the relay has to request to leave. While the drone
+    /// follows the setpoints (`flown`), it also reports an unknown endurance.
     pub(super) fn review_endurance(&mut self, now: Instant, flown: bool) {
         if let Some(endurance) = self.endurance.first_mut() {
             if flown && endurance.known(now).is_none() {
@@ -347,7 +357,8 @@ impl Relay {
         }
     }
 
-    /// Returns the time of the next comparison of margin and limit. `None` without a reserve, and before a valid value.
+    /// Returns the time at which the remaining flight time must be compared with its limit again. `None` without a
+    /// reserve, and before a valid value.
     pub(super) fn endurance_timeout(&self) -> Option<Instant> {
         let endurance = self.endurance.first()?;
         let is_compared = endurance.reserve.is_some() && endurance.end.is_some();

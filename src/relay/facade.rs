@@ -471,7 +471,7 @@ impl Relay {
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
     }
 
-    /// Returns the reason why the guard holds the drone back on `side`; otherwise `None`.
+    /// Returns the reason on the side `side` that keeps the setpoint from the agreed position, if any.
     ///
     /// `None` as well without a guard (collision avoidance). While the drone does not fly to setpoints, only
     /// [`HoldReason::Order`] is possible.
@@ -494,11 +494,12 @@ impl Relay {
         self.node.round().target().filter(|_| known)
     }
 
-    /// Returns the start and end of this relay's slots at the agreed positions, as fractions of the frame.
+    /// Returns the begin and end of this relay's time slots, as fractions of the frame (slot cycle). The slots are
+    /// those of the agreed positions.
     ///
-    /// `None` unless the mission has fitted slots (`fitted_gap` above 0). Also `None` after the lease has expired,
-    /// without a quorum, and after the acceptance of a view (another mission or other relays) until the agreement in
-    /// it.
+    /// `None` unless the mission has slots fitted to the need of each hop (`fitted_gap` above 0). Also `None` after the
+    /// lease has expired, without a quorum, and after the acceptance of a view (another mission or other relays) until
+    /// the agreement in it.
     ///
     /// The slots of all hops fill the frame. They change when the result of an agreement reaches this relay: from the
     /// last relay to the leader, hop by hop. Until it has passed all relays, some relays have the new slots, and the
@@ -507,7 +508,8 @@ impl Relay {
         self.node.slot_shares()
     }
 
-    /// Returns an upper bound of the worst hop's SIR at the current altitudes, for any x, linear.
+    /// Returns an upper bound, linear, of the chain's worst hop SIR, whatever x the relays take. The bound is for the
+    /// relays' current altitudes.
     ///
     /// The leader (the relay that starts the search) knows it after Algorithm 1 or 4. `None` at all other relays, and
     /// with the paper's fixed-step schedule, which gives no such bound.
@@ -621,8 +623,8 @@ impl Relay {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns the reason why the last measurements gave no estimate of the interferer. `None` if they gave an
-    /// estimate, and at all relays except the leader (the relay that starts the search).
+    /// Returns the reason why the last collected measurements gave no estimate of the interferer. `None` if they gave
+    /// an estimate, and at all relays except the leader (the relay that starts the search).
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
@@ -641,7 +643,8 @@ impl Relay {
 }
 
 impl Relay {
-    /// Processes a measurement of the interference. `Settings::measure` or `Settings::listen` must enable its kind.
+    /// Processes a measurement of the interference. Samples of the kinds `Interference` and `FirstHop` need
+    /// `Settings::measure`, all other kinds need `Settings::listen`.
     ///
     /// Takes constant time. Unusable samples are counted as
     /// [`Stats::samples_rejected`](crate::Stats::samples_rejected).
@@ -707,9 +710,9 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Records whether the drone flies to the setpoints (`flown`). See [`handle_control`](Self::handle_control).
+    /// Records if the drone flies to the setpoints (`flown`). See [`handle_control`](Self::handle_control).
     ///
-    /// Returns true if this changes the state of the guard (collision avoidance).
+    /// Returns true if the call changes the state of the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         let now = self.clock.advance(now);
         self.review_endurance(now, flown);
@@ -735,9 +738,9 @@ impl Relay {
     /// Reports that relays on `side` that were lost or under a pilot's control are no longer in the air. See
     /// [`handle_control`](Self::handle_control).
     ///
-    /// The guard (collision avoidance) no longer keeps clear of these relays. If the view still has relays on that
-    /// side, the drone does not move toward them before the guard has received a message of the nearest of them. If the
-    /// nearest relay is lost before its message, call the function again. Takes constant time.
+    /// The guard (collision avoidance) no longer keeps clear of these relays. If other relays of the view remain on
+    /// that side, the drone does not move toward them until the guard has received a message from the nearest of them.
+    /// If this nearest relay is lost before it sends a message, call the function again. Takes constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }
@@ -781,8 +784,9 @@ impl Relay {
     /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
     ///
     /// Call it right after the start and [`resume_view`](Self::resume_view): it has no effect once the relay has taken
-    /// part in a pass or a view change. A relay with two wires cannot be a spare. No guard knows the place of a waiting spare: it
-    /// has to wait at least the separation away from all positions of the chain. Takes constant time.
+    /// part in a pass (message along the chain) or in a view change (vote on the members). A relay with two wires
+    /// cannot be a spare. No guard (collision avoidance) knows the position of a waiting spare: the spare must stay at
+    /// least the minimum separation away from all positions of the chain. Takes constant time.
     pub fn wait_as_spare(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.wait_as_spare(now);

@@ -72,7 +72,8 @@ fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: 
     node.on_duplicate_index(now, sender);
 }
 
-/// Handles a frame addressed to this relay, from a (possible) neighbour or from a ground station.
+/// Handles a frame that is addressed to this relay. Its sender is a ground station, a neighbour, or a node that could
+/// become a neighbour.
 fn receive_addressed(
     node: &mut Node,
     endpoint: &mut Endpoint,

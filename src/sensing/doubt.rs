@@ -46,17 +46,17 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of consistent measurements, divided by the variance that the operator expects. With a larger
+/// Maximum variance of the measurements about their fit, in units of the operator's expected variance. With a larger
 /// variance, the leader searches for a faulty relay.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum drop of the fit's residual that shows a faulty relay, when the fit leaves out this relay. The unit is the
-/// variance of the remaining measurements.
+/// Minimum drop of the fit's residual that shows a relay as faulty, when the fit leaves out this relay. The unit is the
+/// variance of the fit without this relay.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual of the fit that can show a faulty relay. It is also the minimum drop of the residual when the fit
-/// leaves out this relay. The residual is the sum of squared relative errors. A single measurement with an error of
-/// some 15 % causes this residual.
+/// Minimum residual of the fit at which a relay can be found faulty. The residual is the sum of squared relative
+/// errors. When the fit leaves out the faulty relay, the residual must also drop by at least this value. A single
+/// measurement with an error of some 15 % causes this residual.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of the second smallest variance to the smallest that identifies a faulty relay. Each variance belongs
@@ -71,9 +71,9 @@ const CONSISTENT: f64 = 0.1;
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits of the squared difference between an excluded relay's measurement and those of other relays. Up to the limit,
-/// the measurement fits again. The first is a multiple of the variance, the second a squared relative difference. The
-/// larger limit counts.
+/// Limits up to which the measurement of an excluded relay is accepted again. They apply to the squared relative
+/// difference between this measurement and the fit to the other relays' measurements. The first limit is a multiple of
+/// the variance, the second the squared difference itself. The larger limit applies.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays to identify a faulty relay. With four relays only three measurements are left, which always
@@ -84,8 +84,8 @@ const FEWEST: u16 = 5;
 /// [`Sums::count`].
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. With a larger ratio,
-/// rounding errors of the sums exceed this relay's part of the sums.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. With a larger ratio, the
+/// rounding errors of the sums exceed the contribution of this relay to the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +96,7 @@ enum Stage {
     Trying(u16),
     /// Notice: a sensing pass that tells the faulty node, which has this number, that it is excluded.
     ///
-    /// There are two such passes. The flag is false in the first pass, whose measurements are discarded. The flag is
+    /// There are two such passes. The second value is false in the first pass, whose measurements are discarded. It is
     /// true in the second pass, whose measurements are used for the estimate.
     Announcing(u16, bool),
 }
@@ -149,8 +149,8 @@ impl Trial {
         }
     }
 
-    /// Evaluates the `sums` of a sensing pass in the search for a faulty relay. The chain has `relays` members, whose
-    /// node numbers are within 1 to `nodes`.
+    /// Processes the `sums` of a sensing pass in the search for a faulty relay; returns the next action. The chain has
+    /// `relays` members, whose node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -242,9 +242,9 @@ fn narrow(number: f64) -> f32 {
 /// below 1 / 300.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. An absurd measurement is far
-/// from `expected`, the estimate at `place`. It also does not fit the measurements of the remaining relays, whose sums
-/// are `others`.
+/// Returns true if a relay must exclude its own measurement at `place`, because it is absurd. An absurd measurement is
+/// far from `expected`, the value that the current estimate gives for this place. It also does not fit the measurements
+/// of the remaining relays, whose sums are `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -266,9 +266,9 @@ pub(crate) fn is_absurd(
 
 /// Returns true if an excluded relay's measurement still does not fit those of the remaining relays.
 ///
-/// The measurement v = 1e-12 W / I at `place` is compared with e. e is the value at this place of a source fitted to
-/// `others`, the sums of the remaining relays. The difference is (v / e - e / v) / 2, which is symmetric in both.
-/// `expected` is v by the current estimate, and sets the measurement's weight.
+/// A source is fitted to the remaining relays' measurements, whose sums are `others`, and gives the value e for
+/// `place`. The measurement there is v = 1e-12 W / I. The difference is (v / e - e / v) / 2, which is symmetric in v
+/// and e. `expected` is the value that the current estimate gives; it sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -290,11 +290,10 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing should receive several times its noise `noise_w`, W. The receiver of
-/// this relay is then faulty.
+/// Returns true if the receiver of a relay that measures no interference is faulty.
 ///
-/// The expected power follows from the repeated measurements of the remaining relays, whose sums are `others`. `there`
-/// has the terms of the relay's position.
+/// This is so if the other relays' repeated measurements, whose sums are `others`, predict several times the relay's
+/// noise `noise_w`, W. `there` has the terms of the relay's position.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -309,8 +308,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than measurement errors can explain. The value
-/// ((ratio - 1 / ratio) / 2)^2 must then exceed both `deviations` times the ratio's variance `unsure`, and `least`.
+/// Returns true if a ratio of powers differs from 1 by more than measurement errors can explain. This is so if ((ratio
+/// - 1 / ratio) / 2)^2 exceeds `least`, and also exceeds `deviations` times `unsure`, the variance of the ratio.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -319,9 +318,9 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The limits are for the
-/// squared relative difference. The first is a multiple of the variance; the second corresponds to a factor of 1.5. The
-/// larger limit counts.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. Both limit the squared
+/// relative difference. The first is a multiple of its variance; the second corresponds to a factor of 1.5. The larger
+/// limit applies.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer relays it is unknown which

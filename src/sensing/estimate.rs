@@ -31,7 +31,7 @@ pub enum InterferenceEstimate {
     /// Interference as the mission configures it; measurements have not changed it.
     #[default]
     Mission,
-    /// Unknown interference. The relays take this spacing along the line Tx to Rx in order to measure it.
+    /// Unknown interference. The relays take this spacing along the line Tx to Rx in order to measure the interference.
     Unknown(Spread),
     /// Single interfering transmitter on the ground.
     Source {
@@ -44,9 +44,9 @@ pub enum InterferenceEstimate {
 }
 
 impl InterferenceEstimate {
-    /// Returns `mission` with this interference estimate.
+    /// Returns `mission` with its interference replaced by this estimate.
     ///
-    /// `own` is the mission's own interference, for the estimate [`Mission`](Self::Mission).
+    /// `own` is the interference that the mission configures; the estimate [`Mission`](Self::Mission) uses it.
     ///
     /// # Errors
     /// [`MissionError`] if the estimated interference is out of range.
@@ -96,52 +96,54 @@ impl Spread {
 pub struct NumberedEstimate {
     /// Sequence number of the estimate; 0 for the estimate before any change.
     pub number: u16,
-    /// Interference estimate that has this sequence number.
+    /// Interference estimate to which the sequence number belongs.
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change of the interference above which a new estimate is adopted.
+/// Minimum mean square relative change of the interference for which a refined estimate is adopted. The mean is over
+/// the measured positions.
 const WORTH: f64 = 1e-5;
 
-/// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
-/// can mean that the interference itself has changed.
+/// Maximum mean square relative change of the interference in a refinement of the estimate. The mean is over the
+/// measured positions. A larger change can mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's mean square change to the change expected from errors. For a stationary source. With
-/// a smaller ratio, the new estimate is only a refinement.
+/// Minimum ratio, for a stationary source, of an estimate's mean square change to the expected one. The expected change
+/// is the change due to measurement errors. With a smaller ratio, the new estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to the change expected from errors. For a moving source. With a
-/// smaller ratio, the new estimate is only a refinement.
+/// Minimum ratio, for a moving source, of an estimate's mean square change to the expected one. The expected change is
+/// the change due to measurement errors. With a smaller ratio, the new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's mean square change to the change expected from errors. A larger ratio shows a new
-/// interferer. For a stationary source, after [`REFINED`] refinements.
+/// Minimum ratio of an estimate's mean square change to the expected one that shows a new interferer. It applies to a
+/// stationary source whose estimate has been refined [`REFINED`] times. The expected change is the change due to
+/// measurement errors.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of the interferer's track from the fit, divided by the fit's variance. With a larger
-/// deviation the position is not predicted from the track.
+/// Maximum mean square difference between the interference by the track and by the fit. The unit is the error variance
+/// of the fit. With a larger difference the position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
-/// measured positions divided by the error variance of one position.
+/// Minimum factor by which the information must have grown before a refined estimate is adopted. Information is the
+/// number of measured positions divided by the error variance of one position.
 const LEARNED: f64 = 1.1;
-/// Number of refined estimates of a stationary interferer. After them, the estimate stays until the interference
-/// changes.
+/// Number of times that the estimate of a stationary interferer is refined. Then the estimate stays until the
+/// interference changes.
 const REFINED: u8 = 4;
 
-/// Time that drones are assumed to need for a few metres. A moving interferer is predicted this far ahead, plus half
-/// the interval between two sensing passes.
+/// Time in which drones are assumed to fly the few metres to their new positions. The position of a moving interferer
+/// is predicted for this time from now, plus half the interval between two sensing passes.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
 /// Mean square relative error of measurements above which they contradict the estimated source. The relays then treat
 /// the interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error of measurements above which they contradict the mission's interference. The unit is the variance
-/// that the operator expects. The relays then treat the interference as unknown.
+/// Maximum mean square relative error of measurements that agree with the mission's interference. The unit is the
+/// variance that the operator expects. With a larger error the relays treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
@@ -151,7 +153,7 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Expected mean square of the relative error of the current estimate's interference.
     chance: f64,
-    /// Number of estimates adopted for the same interferer, up to [`REFINED`].
+    /// Number of times that the estimate of the same interferer has been replaced, up to [`REFINED`].
     refined: u8,
     track: Track,
 }
@@ -273,8 +275,8 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit to all measurements, and the source of interference by this fit. Clears a level in `levels`,
-/// measured at Tx or Rx, that does not fit.
+/// Returns the fit to all measurements, and the source of interference that this fit gives. A level measured at Tx or
+/// Rx is cleared in `levels` if it does not fit the relays' measurements.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -301,9 +303,9 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer at its predicted position for the time when the drones are in place. `None` if the
-/// interferer does not move, or if its track deviates too much from the fit. `heard` is the mean time of the
-/// measurements.
+/// Returns a moving interferer at the position predicted for the arrival of the drones. The drones then have reached
+/// the positions that they compute from it. `None` if the interferer does not move, or if its track deviates too much
+/// from the fit. `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -326,9 +328,9 @@ fn followed(
     None
 }
 
-/// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added to the relays' measurements. Returns `fit`
-/// unchanged if the level does not agree with those measurements: the path loss over the ground then differs from the
-/// mission's.
+/// Returns `fit` extended by `level`, the interference level measured at Tx or Rx. The x of this ground station is
+/// `x_m`. Returns `fit` unchanged if the level does not agree with the relays' measurements: the path loss over the
+/// ground then differs from the mission's.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -362,8 +364,8 @@ fn with_end(
 
 /// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it.
 ///
-/// It is the mean of the power measured at Rx and the power computed from `source` and the path loss, weighted by their
-/// variances. If the two differ too much, it is the measured power.
+/// It is the mean of the power measured at Rx and the power computed from `source` and the path loss, each weighted by
+/// the inverse of its variance. If the two powers differ too much, it is the measured power.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -439,8 +441,8 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Squared deviation of a new position from the track that shows a new interferer. It is in units of the track's
-/// variance. The track then starts again.
+/// Minimum squared deviation of a found position from the track that shows a new interferer. The unit is the variance
+/// of the deviation. The track then starts again at the found position.
 const ELSEWHERE: f32 = 49.0;
 
 /// Kalman filter of the interferer along one axis: position, m, velocity, m/s, and their covariance.
@@ -460,8 +462,8 @@ impl Axis {
         }
     }
 
-    /// Advances position and velocity by `seconds`. The variance of the velocity grows by `walk` per second, in
-    /// m^2/s^3.
+    /// Predicts position and velocity for a time `seconds` later. The variance of the velocity grows by `walk` per
+    /// second; the unit of `walk` is m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
         let [at, both, speed] = &mut self.variance;
@@ -543,7 +545,7 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the interferer's last position, and its predicted position at `then`: (x, y), m, of each. `None` if the
+    /// Returns the interferer's last position and the position predicted for `then`, each as (x, y), m. `None` if the
     /// interferer does not move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;

@@ -28,12 +28,12 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error in the estimate of the error variance. The error counts as if this number of
-/// measured positions had shown it.
+/// Weight of the operator's expected error variance in the estimated error variance. The estimate is a weighted mean of
+/// the expected and the observed variance; the expected one counts like this number of measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance the
-/// measurements do not show on which side of the line Tx to Rx the source is.
+/// Minimum variance of the measured positions' lateral offsets y, in units of D / 2. D is the distance from Tx to Rx.
+/// With a smaller variance the measurements do not show on which side of the line Tx to Rx the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -44,7 +44,8 @@ pub struct FoundSource {
     pub source: Interferer,
     /// Variances of the source's estimated x and y, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source. If false, `source` is the closest source, and `variance_m2` is 0.
+    /// True if the measurements fit a single source. If false, `source` is the source whose interference is closest to
+    /// the measurements, and `variance_m2` is 0.
     pub is_one: bool,
 }
 
@@ -190,7 +191,8 @@ impl Fit {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "checked")]
-    /// Returns the most likely power of a source at (`x_m`, `y_m`), W; `None` outside of 1e-6 to 1e9 W.
+    /// Returns the most likely power, W, of a source at (`x_m`, `y_m`), given the measurements. `None` if the power is
+    /// outside of 1e-6 to 1e9 W.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {
             power_w: mission.config().common.power_w,
@@ -224,8 +226,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and a small variance. The variance must be below four
-    /// times the variance that the operator expects.
+    /// Returns true if the fit has more measured positions than unknowns, and its variance is small. The variance must
+    /// be below four times the variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -259,8 +261,8 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// If the measured positions do not determine on which side of their mean y the source is, the result is on the
-    /// side of `side_m`, a lateral offset y.
+    /// The measured positions may not determine if the y of the source is above or below their mean y. The source is
+    /// then on the same side of their mean y as `side_m`, a lateral offset, m.
     ///
     /// # Errors
     /// [`Unfit::NoSource`] if no source on the ground fits.
@@ -432,7 +434,7 @@ impl Best<'_> {
 mod tests {
     use super::Factor;
 
-    /// Symmetric matrix of the fit for four positions that differ in all terms. Its rows are linearly independent.
+    /// Symmetric matrix of the fit for four measured positions. Its rows are linearly independent.
     const MATRIX: [[f64; 4]; 4] = [
         [4.0, 0.6, 1.1, -0.7],
         [0.6, 3.0, -0.4, 0.9],

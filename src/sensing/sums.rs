@@ -164,8 +164,8 @@ impl Sums {
     };
 
     /// Adds a measured position with its `terms`, the measured `v`, and the `expected` v, both above 0. v is 1e-12 W /
-    /// I. The position's weight follows from both v, and is multiplied by `share`. `measured` is the number of
-    /// measurements there. At most 60 instructions.
+    /// I, with the interference power I. The position's weight is computed from `v` and `expected`, and multiplied by
+    /// `share`. `measured` is the number of measurements at the position. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
@@ -201,7 +201,7 @@ impl Sums {
         }
     }
 
-    /// Multiplies the weight of all measurements in the sums by `share`, and adds `seconds` to their age.
+    /// Adds `seconds` to the age of all measurements in the sums, and multiplies their weight by `share`.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
         *age += *count * seconds;
@@ -242,7 +242,7 @@ impl Sums {
         (self.age_s() * 1e6) as u64
     }
 
-    /// Returns true if a relay can have sent these sums. All are finite, and sums of squares are not negative.
+    /// Returns true if these sums are possible: all are finite, and sums of squares are not negative.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())
@@ -255,7 +255,7 @@ impl Sums {
 /// Minimum distance between two positions that count as different. It is a fraction of the distance from Tx to Rx.
 const APART: f32 = 1.0 / 200.0;
 
-/// Measurements of one relay: the mean at its position, and the sums of earlier positions. 120 bytes.
+/// Measurements of one relay: the mean at its current position, and the sums of its earlier positions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Listener {
     half_life: Duration,
@@ -267,7 +267,8 @@ pub(crate) struct Listener {
     heard: Average,
 }
 
-/// Terms of a relay's current position for the fit, and v = 1e-12 W / I measured there. I is the interference power.
+/// Current position of a relay, as terms for the fit, and the measurement there. The measurement is v = 1e-12 W / I,
+/// with the interference power I.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,

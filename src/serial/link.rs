@@ -9,14 +9,15 @@ use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
 
-/// Maximum number of bytes, and of failed reads, per poll and port.
+/// Maximum number of bytes read, and of failed reads, in one poll of a port.
 #[doc(hidden)] // public because the documentation of public functions links to it
 pub const READ_LIMIT: usize = 64;
 
 /// Capacity of the transmit queue, bytes: the frame that the port is sending, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
 
-/// Maximum pause between attempts to write to a port that accepts no bytes, in byte times.
+/// Maximum pause between attempts to write to a port that accepts no bytes. The unit is the transmission time of a
+/// byte.
 const LONGEST_PAUSE: u32 = 128;
 
 /// Placeholder type for a link without a driver-enable pin. Such a link is full duplex, or its radio switches between
@@ -167,7 +168,7 @@ pub(super) trait FrameLink {
     fn has_room(&self) -> bool;
     /// Queues a frame for sending. A frame that does not fit is dropped and counted.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame that is dropped because its port does not exist with this driver.
+    /// Counts a frame that is dropped because it is for a port that this driver does not have.
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);

@@ -88,7 +88,7 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
-/// Trigger of a UART's interrupt, which starts to send: a closure, or a type of the firmware.
+/// Trigger of a UART's interrupt, whose handler sends the queued bytes. It is a closure, or a type of the firmware.
 pub trait Pend {
     /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);

@@ -42,7 +42,7 @@ impl Endpoint {
 
     /// Signs all frames from now on with the key and epoch in `auth`. This node's nonces count up from `claim`, a
     /// random number drawn at start. Once a remote node has been silent for `gone_after`, a second node with the same
-    /// number can replace it.
+    /// node number is accepted in its place.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));

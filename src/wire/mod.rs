@@ -30,7 +30,7 @@ pub const MAX_NODE: u16 = 4094;
 /// becomes the relay's neighbour on that side.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Number of relays, the nearest ones, that exchange messages with Tx or Rx on a shared channel.
+/// Number of the relays nearest to Tx or Rx that exchange messages with it on a shared channel.
 pub(crate) const STATION_REACH: u16 = 2 * CANDIDATES;
 
 /// Maximum length on the wire of a sweep message with its frame, bytes. A sweep carries up to sixteen target SIRs.

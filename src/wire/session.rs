@@ -54,8 +54,9 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number if a second node uses its node number. The claim number is
-/// then the larger one, and the node with the larger claim number keeps the node number.
+/// Bit of a claim number, set by a relay that has a position when a second node uses its node number. The claim number
+/// is then larger than any claim number without this bit. Of two nodes with the same number, the one with the larger
+/// claim number keeps the node number.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -76,8 +77,8 @@ struct Peer {
     node: u16,
     /// True if a handshake to the remote node of this table entry must be sent.
     handshake: bool,
-    /// True if the next handshake to the remote node requests a reply in any case. If false, it requests a reply only
-    /// until the remote node has proved that it is present.
+    /// True if the next handshake requests a reply even from a remote node that has proved its presence. If false, the
+    /// handshake requests a reply only while the remote node has not proved its presence.
     requests_reply: bool,
     /// True if the remote node has sent this relay's nonce back. The remote node is then present, and the two nodes
     /// know each other's nonce.
@@ -95,8 +96,8 @@ struct Peer {
     older: OlderHandshakes,
 }
 
-/// Counts consecutive handshakes of a node with an outdated nonce. Several of them show that the node's epoch went
-/// back, or that the node restarted in the same epoch.
+/// Counter of consecutive handshakes of a node with an outdated nonce. Several such handshakes show that the node's
+/// epoch went back, or that the node restarted in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,
@@ -140,7 +141,7 @@ impl Peer {
 pub(crate) struct Session {
     key: Key,
     epoch: u32,
-    /// Silence of a remote node after which a second node with the same node number can replace it.
+    /// Silence of a remote node after which a second node with its node number is accepted in its place.
     gone_after: Duration,
     /// Random claim number that this relay draws at its start. If two nodes have the same node number, the one with the
     /// larger claim number keeps it. The lower halves of this relay's nonces count up from the claim number.
@@ -184,7 +185,7 @@ pub(crate) enum Checked {
 
 impl Session {
     /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. Once a remote node
-    /// has been silent for `gone_after`, a second node with the same number can replace it.
+    /// has been silent for `gone_after`, a second node with the same node number is accepted in its place.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -255,8 +256,9 @@ impl Session {
 
     /// Schedules a handshake that requests a reply from node `to`, from which no frames arrive any more.
     ///
-    /// Does nothing if node `to` seems to have restarted in the same epoch: the handshake would show the node its
-    /// former nonce. With this nonce it could continue its former session, and use frame counters twice.
+    /// Does nothing if node `to` seems to have restarted in the same epoch. The handshake would show that node the
+    /// nonce that it used before the restart. The restarted node could then continue its former session, and use frame
+    /// counters twice.
     pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;

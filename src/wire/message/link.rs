@@ -34,8 +34,8 @@ pub struct Hello {
     /// - If the sender is outside of the chain: true if it would join the chain when it is called.
     /// - If the destination is outside of the chain: true if the destination is called to join.
     pub ready: bool,
-    /// Number of relays that the destination can reach through the sender, which counts, too: 1 to 1000. These relays
-    /// are linked in a row that begins with the sender and leads away from the destination.
+    /// Number of relays that the destination can reach through the sender, with the sender: 1 to 1000. These relays are
+    /// linked in a row that begins with the sender and leads away from the destination.
     pub behind: u16,
     /// Nodes that the sender receives in the direction of this hello's destination, as a bit mask. Bit i, 0 to 3,
     /// stands for the node whose number differs from the sender's by i + 1.
@@ -53,7 +53,7 @@ pub struct Hello {
     /// Flag for a node outside of the chain. Its meaning depends on `fresh`.
     ///
     /// With `fresh`: the sender is outside of the chain, and no relay has it as a neighbour. Without `fresh`: the
-    /// destination is outside of the chain, and the relays of an agreed view without the destination are in place.
+    /// destination is outside of the chain, and the relays have agreed on a view without it and are at their positions.
     pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,

@@ -79,18 +79,18 @@ pub enum Message {
         /// Number of the destination's heartbeat request that is answered, 0 for none.
         reply: u16,
     },
-    /// Message to the next relay: profiles (altitude and power) of all relays so far.
+    /// Message to the next relay: profiles (altitude and power) of the relays up to the sender.
     Gather(Roster),
     /// Reply to `Gather`: profiles (altitude and power) of the whole chain.
     Gathered(Roster),
-    /// Message to the next relay: interference estimate, and all relays' measurements so far.
+    /// Message to the next relay: interference estimate, and measurements of the relays up to the sender.
     Sense(Heard),
     /// Reply to `Sense`: measurements of the sender and of all relays that the pass has reached after it.
     Sensed(Heard),
     /// Message to the next relay: token of Algorithm 2 (stepwise improvement of the positions). The relay that receives
     /// the token may move to a position with a better SIR.
     Token(Token),
-    /// Reply to `Token`: position of the sender, and SIR of the worst hop from the sender on.
+    /// Reply to `Token`: position of the sender, and SIR of the worst hop after the sender in the pass.
     Moved(Moved),
     /// Message to the next relay: lease renewal, which the leader of the view (agreed members) sends.
     Pulse(Pulse),

@@ -8,7 +8,8 @@ use crate::geodetic::{SITES_LENGTH, Sites};
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
-/// Encoding in an offer message. The offer answers a hello, and repeats the `offer_number` of this hello.
+/// Encoding of an uploaded mission in an offer message. The offer answers a hello message, and repeats the
+/// `offer_number` of that hello.
 impl Upload {
     /// Length of an offer's body, bytes.
     pub(super) const OFFER: usize = Self::LENGTH + size_of::<Word>();
@@ -52,7 +53,8 @@ impl Upload {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Version of the uploaded mission, and digest of the mission loaded before flight that it replaces.
+    /// Version of the uploaded mission, and digest of the mission that the relays loaded before flight. The upload
+    /// replaces the loaded mission.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],

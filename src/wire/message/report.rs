@@ -80,7 +80,7 @@ impl Entry {
     /// Creates an entry on a relay, whose state is `age` tenths of a second old.
     ///
     /// `relay` is the relay's number plus 1000 times the code of [`refusal`](Entry::refusal). `state` combines the
-    /// relay's phase, reasons to wait, control state and flags: see [`Entry::state`].
+    /// relay's phase, hold reasons, control state and flags: see [`Entry::state`].
     pub const fn new(relay: u16, age: u8, state: u16, at: Coarse) -> Self {
         Self {
             relay: Word::new(relay),
@@ -107,8 +107,8 @@ impl Entry {
 
     /// Returns direction and distance of the nearest node that the relay refuses; 0 for none.
     ///
-    /// 1 to 4: another mission, at a node that many numbers toward Tx. 5 to 8: another mission, 1 to 4 numbers toward
-    /// Rx. 9 to 16: the same for another key.
+    /// 1 to 4: another mission, at a node whose number is smaller by 1 to 4 (toward Tx). 5 to 8: another mission, at a
+    /// node whose number is larger by 1 to 4 (toward Rx). 9 to 16: the same for another key.
     pub const fn refusal(&self) -> u16 {
         self.relay.number().saturating_sub(1) / MAX_RELAYS
     }
@@ -121,10 +121,9 @@ impl Entry {
         self.state.number()
     }
 
-    /// Returns the control state of the drone, from 1; 0 without an autopilot.
+    /// Returns the number of the drone's control state, from 1; 0 without an autopilot.
     ///
-    /// In the states from 3 on, the drone is in the air. These are in order: standby, engaged, blind, and engaged with
-    /// a refused setpoint.
+    /// In the states 3 to 6 the drone is in the air: 3 standby, 4 engaged, 5 blind, 6 engaged with a refused setpoint.
     #[doc(hidden)]
     pub const fn control(&self) -> u16 {
         self.state.number() / 4096 % 7

@@ -76,8 +76,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. If the sweep has a measured
-    /// interference or a lateral offset, this number precedes the list of farthest x.
+    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. A measured interference or a
+    /// lateral offset is encoded before the list of farthest x.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -141,7 +141,7 @@ pub struct SweepVerdict {
     /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Result of the sweep: the target that the chain commits to, if any, and the slack for each target. The slack is
-    /// the maximum length of a chain that meets the target, less the distance from Tx to Rx.
+    /// the maximum length of a chain that meets the target, minus the distance from Tx to Rx.
     pub verdict: Verdict,
     /// x to which the destination of this reply must move if a target is committed, m. If it is `None`, the destination
     /// takes the farthest x that it sent for this target in its sweep message.
@@ -383,9 +383,9 @@ pub struct Moved {
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
-    /// True if the sender has moved in this pass, or any relay that received the token after the sender.
+    /// True if the sender, or a relay that received the token after the sender, has moved in this pass.
     pub position_changed: bool,
-    /// SIR of the worst hop, linear, among the hops that follow the sender in the direction of the pass.
+    /// Linear SIR of the worst hop from the sender to the end of the chain, in the direction of the pass.
     pub worst_sir: f32,
     /// Transmit power of the sender, W.
     pub power_w: f32,

@@ -31,8 +31,8 @@ pub struct Poll {
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the relay that once proposed the view `agreed` was polled. For the initial view, this relay is the
-    /// leader. If it was polled, exactly half of the members' votes are enough for a quorum.
+    /// True if the relay that proposed `agreed` was polled; for the initial view, if the leader was. Exactly half of
+    /// the members' votes are then enough for a quorum.
     pub proposer: bool,
     /// Upper bound of the remaining leases of members of `agreed` that were not polled, tenths of a second.
     pub lease_left: u16,
@@ -82,7 +82,7 @@ pub struct Decision {
     pub place: u16,
     /// Number of relays that the proposal has reached: 1 to 1000.
     pub reached: u16,
-    /// Newest agreed view that any polled relay knows. The view in `accepted` replaces it.
+    /// Newest agreed view that any polled relay knows. The relays replace it by the view in `accepted`.
     pub base: View,
     /// View that the relays must accept; `None` without a quorum. This is the proposed view, or an older view that the
     /// vote found to be decided already.
