@@ -563,8 +563,7 @@ impl Reporting {
         side: Side,
         own: Own,
     ) -> Option<Reports> {
-        let byte = self.byte_time(now, member, side);
-        let period = period(member, side, byte);
+        let (period, byte) = self.rate(now, member, side);
         let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
         let (control, power_w) = (self.control, self.power_w);
         let reported = self.reported;
@@ -665,27 +664,31 @@ impl Reporting {
         (entries > 0).then_some(report)
     }
 
-    /// Returns the time between two reports, divided by the length of the first report in bytes. With this time the
-    /// reports of all relays take an eleventh of the data rate.
+    /// Returns the time between two reports, and this time divided by the length of a report in bytes. The reports of
+    /// all relays then take an eleventh of the data rate.
     ///
     /// The data rate is assumed to be one sweep in each `hop_time`. On a shared channel it is also at least 2350 bytes
     /// for each relay in each `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). The reports use a tenth of these
-    /// bytes, divided among the relays in proportion to their loads.
-    fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
+    /// bytes, divided among the relays in proportion to their loads. On wires the time is that of the relay nearest to
+    /// the station, because this relay has the most to send.
+    fn rate(&self, now: Instant, member: &Member, side: Side) -> (Duration, Duration) {
         let settings = &member.settings;
         let hop = (settings.hop_time.as_micros() * 108 / 1_200).clamp(1, 1 << 24);
-        let hop = u32::try_from(hop).unwrap_or(u32::MAX);
-        let alone = match settings.wiring {
-            Wiring::Pair => hop.into(),
+        let relays = u32::from(member.all);
+        let wires = 28 * (relays + 1); // an eighth is in reserve
+        let (own, all, byte) = match settings.wiring {
+            Wiring::Pair => (wires, wires, hop),
             Wiring::Shared => {
-                let (all, own) = (all_loads(member), load(member, from_end(member, side)));
-                let by_hop = (u64::from(16 * all / own) * u64::from(hop)) >> 4;
-                let of_mean = 256 * all / (own * u32::from(member.all)).max(1);
-                by_hop.min((of_mean * (micros(settings.probe_after) / (256 * 235))).into())
+                let most = micros(settings.probe_after) / (235 * relays);
+                let own = load(member, from_end(member, side));
+                (own, all_loads(member), hop.min(most.into()))
             }
         };
         let is_both = self.watched.iter().all(|watched| now < watched.until);
-        Duration::from_micros(if is_both { alone * 5 / 2 } else { alone })
+        let byte = if is_both { byte * 5 / 2 } else { byte };
+        let period = u64::from(all) * byte;
+        let byte = Duration::from_micros(period / u64::from(own));
+        (Duration::from_micros(period).max(LEAST_PERIOD), byte)
     }
 }
 
@@ -716,16 +719,6 @@ const fn all_loads(member: &Member) -> u32 {
     let all = member.all as u32;
     let (eights, rest) = (all / 8, all % 8);
     SHARE * (2 * all + 4 * eights * eights.saturating_sub(1) + rest * eights)
-}
-
-/// Returns the time between two reports of a relay. On wires the result is the time of the relay nearest to the
-/// station, because this relay has the most to send.
-fn period(member: &Member, side: Side, byte: Duration) -> Duration {
-    let bytes = match member.settings.wiring {
-        Wiring::Pair => 28 * (u32::from(member.all) + 1), // an eighth is in reserve
-        Wiring::Shared => load(member, from_end(member, side)),
-    };
-    byte.times(bytes).max(LEAST_PERIOD)
 }
 
 /// Returns the age at `now` of a state of the time `at`, in tenths of a second, rounded. It includes 20 ms for the
