@@ -20,6 +20,7 @@ use core::num::NonZeroU16;
 use heapless::Vec;
 
 use super::context::Member;
+use super::dispatch::Own;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
 use crate::flight::autopilot::state::State;
@@ -55,12 +56,6 @@ const DIRECT: u8 = MOST_DOUBLINGS + 1;
 /// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
 /// reports.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
-
-/// Maximum time by which telemetry waits on a shared channel while the relays agree on positions.
-pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
-
-/// Maximum time by which telemetry waits on a shared channel during the first agreement.
-pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
 /// Control state of a drone that the relay controls.
 const ENGAGED: u16 = State::Engaged as u16 + 1;
@@ -180,10 +175,6 @@ struct Watched {
     stores_alarm: bool,
 }
 
-/// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), its [refusals](Entry::refusal) toward Tx and toward Rx, the setpoint, and the agreed position.
-pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
-
 impl Reporting {
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
         self.position = Some((at, place));
@@ -203,13 +194,8 @@ impl Reporting {
         self.schedule(member, begins_alarm(before, control));
     }
 
-    /// Records that a node was refused for another mission. The report about it is sent ahead of its turn.
-    pub(crate) fn handle_refusal(&mut self, member: &Member) {
-        self.schedule(member, true);
-    }
-
     /// Schedules this relay's entry for a change. `begins` is true if the change begins an alarm.
-    fn schedule(&mut self, member: &Member, begins: bool) {
+    pub(crate) fn schedule(&mut self, member: &Member, begins: bool) {
         let is_spread = begins && matches!(member.settings.wiring, Wiring::Shared);
         let sides = [Side::Upstream, Side::Downstream];
         for (watched, side) in self.watched.iter_mut().zip(sides) {
@@ -219,7 +205,7 @@ impl Reporting {
                 from = watched.own_from;
             } else if is_spread {
                 // If all drones have the same fault, the relays farther from the station report first.
-                let behind = member.all.saturating_sub(from_end(member, side)) % 8;
+                let behind = member.all.saturating_sub(member.from_end(side)) % 8;
                 from = from + SPREAD.times(behind.into());
             }
             from = from.max(self.reported + STEP);
@@ -236,9 +222,7 @@ impl Reporting {
                 watched.heard = now;
             }
             // The relay four numbers farther from the station reports to the station itself.
-            if from == beyond(member, side.other(), CANDIDATES)
-                && to == beyond(member, side, from_end(member, side))
-            {
+            if from == member.beyond(side.other(), CANDIDATES) && to == member.station(side) {
                 (watched.confirmed, watched.unconfirmed) = (now, DIRECT);
             }
         }
@@ -297,9 +281,9 @@ impl Reporting {
                 let to = if distance == 1 {
                     neighbours.at(away).node()
                 } else {
-                    beyond(member, away, distance)
+                    member.beyond(away, distance)
                 };
-                if is_relay(member, to) {
+                if member.is_relay(to) {
                     let mission = member.digest;
                     if distance == CANDIDATES && now >= watched.confirmed + UNCONFIRMED {
                         // It may have restarted: then it accepts only handshakes.
@@ -312,7 +296,7 @@ impl Reporting {
                 }
             }
             if watched.report_at(wait).is_some_and(|at| now >= at)
-                && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
+                && let Some(to) = watched.to.or_else(|| neighbours.next(member, side))
                 && let Some(report) = self.report(now, member, neighbours, side, own)
             {
                 return Some((side, to, Message::Report(report)));
@@ -372,34 +356,13 @@ const fn begins_alarm(before: u16, now: u16) -> bool {
     before != now && before != 0 && (is_fault || is_released)
 }
 
-const fn is_relay(member: &Member, node: u16) -> bool {
-    node >= 1 && node <= member.all
-}
-
-/// Returns the node `distance` numbers away at `side`.
-const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
-    match side {
-        Side::Upstream => member.node.saturating_sub(distance),
-        Side::Downstream => member.node.saturating_add(distance),
-    }
-}
-
-/// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one. `None` while there is neither.
-fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
-    let end = beyond(member, side, 1);
-    match neighbours.at(side).node() {
-        0 => Some(end).filter(|end| !is_relay(member, *end)),
-        node => Some(node),
-    }
-}
-
 impl Watched {
     /// Ends the reports 60 s after the last request for them, and drops silent destinations.
     ///
     /// A destination is dropped if it has sent no request for 55 s, or no frame for 2.5 s (a relay) or 7.5 s (a
     /// station).
     fn expire(&mut self, now: Instant, member: &Member) {
-        let is_relay = self.to.is_some_and(|to| is_relay(member, to));
+        let is_relay = self.to.is_some_and(|to| member.is_relay(to));
         let is_unheard = now >= self.heard + UNHEARD.times(if is_relay { 1 } else { 3 });
         if now >= self.until {
             *self = Self::default();
@@ -680,7 +643,7 @@ impl Reporting {
             Wiring::Pair => (wires, wires, hop),
             Wiring::Shared => {
                 let most = micros(settings.probe_after) / (235 * relays);
-                let own = load(member, from_end(member, side));
+                let own = load(member, member.from_end(side));
                 (own, all_loads(member), hop.min(most.into()))
             }
         };
@@ -694,14 +657,6 @@ impl Reporting {
 
 fn micros(span: Duration) -> u32 {
     u32::try_from(span.as_micros()).unwrap_or(u32::MAX)
-}
-
-/// Returns the number of relays from this relay (included) to the end of the chain at `side`.
-const fn from_end(member: &Member, side: Side) -> u16 {
-    match side {
-        Side::Upstream => member.node,
-        Side::Downstream => member.all.saturating_sub(member.node).saturating_add(1),
-    }
 }
 
 /// Returns the number of bytes that a relay is assumed to report in each period. `distance` is the difference between
