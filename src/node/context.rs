@@ -53,13 +53,13 @@ impl Member {
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
-            Heading::TowardTx => self.from_end(Side::Downstream),
+            Heading::TowardTx => self.relays_to_end(Side::Downstream),
         };
         (place, self.all)
     }
 
     /// Returns the number of relays from this relay (included) to the end of the chain at `side`.
-    pub(crate) const fn from_end(&self, side: Side) -> u16 {
+    pub(crate) const fn relays_to_end(&self, side: Side) -> u16 {
         match side {
             Side::Upstream => self.node,
             Side::Downstream => self.all.saturating_sub(self.node).saturating_add(1),
@@ -76,7 +76,7 @@ impl Member {
 
     /// Returns the node of the ground station at `side`.
     pub(crate) const fn station(&self, side: Side) -> u16 {
-        self.beyond(side, self.from_end(side))
+        self.beyond(side, self.relays_to_end(side))
     }
 
     pub(crate) const fn is_relay(&self, node: u16) -> bool {

@@ -205,7 +205,7 @@ impl Reporting {
                 from = watched.own_from;
             } else if is_spread {
                 // If all drones have the same fault, the relays farther from the station report first.
-                let behind = member.all.saturating_sub(member.from_end(side)) % 8;
+                let behind = member.all.saturating_sub(member.relays_to_end(side)) % 8;
                 from = from + SPREAD.times(behind.into());
             }
             from = from.max(self.reported + STEP);
@@ -643,7 +643,7 @@ impl Reporting {
             Wiring::Pair => (wires, wires, hop),
             Wiring::Shared => {
                 let most = micros(settings.probe_after) / (235 * relays);
-                let own = load(member, member.from_end(side));
+                let own = load(member, member.relays_to_end(side));
                 (own, all_loads(member), hop.min(most.into()))
             }
         };

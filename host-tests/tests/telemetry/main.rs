@@ -297,7 +297,7 @@ fn half_of_all_frames_lost() {
     assert!(figures.age_s(0.95) <= 5.0, "{}", figures.age_s(0.95));
 }
 
-/// Checks that the ground station's limit of 5 s raises no false alarm of a lost relay, and that 4 s would.
+/// Checks that a limit of 5 s without a report raises no false alarm of a loss, and that 4 s would.
 #[test]
 fn only_limits_from_five_seconds_raise_no_false_alarms() {
     let change = |setup: &mut Setup| setup.faults.loss = 0.1;

@@ -101,7 +101,7 @@ impl Node {
         }
         let [before, after] = [Side::Upstream, Side::Downstream].map(|side| {
             let neighbour = self.layers.neighbours.at(side);
-            neighbour.refused(now, self.member.from_end(side))
+            neighbour.refused(now, self.member.relays_to_end(side))
         });
         let mut kinds = before.into_iter().zip(after).zip([0, 2 * CANDIDATES]);
         // A mission is refused by its signed digest; the other key may be a forger's.
