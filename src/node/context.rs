@@ -6,6 +6,7 @@ use crate::node::circulation::Path;
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
 use crate::side::Heading;
+use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::digest::{MissionId, digest};
@@ -53,9 +54,34 @@ impl Member {
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
-            Heading::TowardTx => self.all.saturating_sub(self.node).saturating_add(1),
+            Heading::TowardTx => self.relays_to_end(Side::Downstream),
         };
         (place, self.all)
+    }
+
+    /// Returns the number of relays from this relay (included) to the end of the chain at `side`.
+    pub(crate) const fn relays_to_end(&self, side: Side) -> u16 {
+        match side {
+            Side::Upstream => self.node,
+            Side::Downstream => self.all.saturating_sub(self.node).saturating_add(1),
+        }
+    }
+
+    /// Returns the node `distance` numbers away at `side`.
+    pub(crate) const fn beyond(&self, side: Side, distance: u16) -> u16 {
+        match side {
+            Side::Upstream => self.node.saturating_sub(distance),
+            Side::Downstream => self.node.saturating_add(distance),
+        }
+    }
+
+    /// Returns the node of the ground station at `side`.
+    pub(crate) const fn station(&self, side: Side) -> u16 {
+        self.beyond(side, self.relays_to_end(side))
+    }
+
+    pub(crate) const fn is_relay(&self, node: u16) -> bool {
+        node >= 1 && node <= self.all
     }
 
     /// Returns a digest of the active mission and the accepted view. Every message of an agreement on positions

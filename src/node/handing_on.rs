@@ -10,17 +10,13 @@
 )]
 
 use super::context::Member;
+use super::dispatch::Own;
 use super::neighbour::Neighbours;
 use crate::features::AUTH;
 use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Message;
-
-pub(crate) const PATIENCE: Duration = Duration::from_micros(0);
-pub(crate) const FIRST_PATIENCE: Duration = PATIENCE;
-
-pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
 /// Telemetry message to be forwarded away from its sender, with the side of the destination. The destination is the
 /// neighbour on the side opposite to the sender. `None` if there is no message.
@@ -40,7 +36,7 @@ impl Reporting {
         None
     }
 
-    pub(crate) fn handle_refusal(&mut self, _: &Member) {}
+    pub(crate) fn schedule(&mut self, _: &Member, _: bool) {}
 
     pub(crate) fn handle_timeout(&mut self, _: Instant) {}
 
@@ -83,15 +79,8 @@ impl Reporting {
         _: Own,
     ) -> Option<(Side, u16, Message)> {
         let (side, message) = self.0.first_mut()?.take()?;
-        let end = match side {
-            Side::Upstream if member.node == 1 => 0,
-            Side::Downstream if member.node == member.all => member.all.saturating_add(1),
-            _ => 1,
-        };
-        match (neighbours.at(side).node(), &message) {
-            (0, Message::Report(_)) if end != 1 => Some((side, end, message)),
-            (0, _) => None,
-            (to, _) => Some((side, to, message)),
-        }
+        let to = neighbours.next(member, side)?;
+        let is_report = matches!(message, Message::Report(_));
+        (is_report || member.is_relay(to)).then_some((side, to, message))
     }
 }

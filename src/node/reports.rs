@@ -20,6 +20,7 @@ use core::num::NonZeroU16;
 use heapless::Vec;
 
 use super::context::Member;
+use super::dispatch::Own;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
 use crate::flight::autopilot::state::State;
@@ -56,12 +57,6 @@ const DIRECT: u8 = MOST_DOUBLINGS + 1;
 /// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
 /// reports.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
-
-/// Maximum time by which telemetry waits on a shared channel while the relays agree on positions.
-pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
-
-/// Maximum time by which telemetry waits on a shared channel during the first agreement.
-pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
 /// Control state of a drone that the relay controls.
 const ENGAGED: u16 = State::Engaged as u16 + 1;
@@ -184,10 +179,6 @@ struct Watched {
     stores_alarm: bool,
 }
 
-/// State that this relay reports about itself. The values are: its combined state (as in an entry, without the control
-/// state), its [refusals](Entry::refusal) toward Tx and toward Rx, its setpoint, and its agreed position.
-pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
-
 impl Reporting {
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
         self.position = Some((at, place));
@@ -207,14 +198,9 @@ impl Reporting {
         self.schedule(member, begins_alarm(before, control));
     }
 
-    /// Records that a node with a wrong mission or key was refused. The report about it is sent early.
-    pub(crate) fn handle_refusal(&mut self, member: &Member) {
-        self.schedule(member, true);
-    }
-
     /// Schedules this relay's entry (its state in a report), because its state has changed. `begins` is true if the
     /// change begins an alarm.
-    fn schedule(&mut self, member: &Member, begins: bool) {
+    pub(crate) fn schedule(&mut self, member: &Member, begins: bool) {
         let is_spread = begins && matches!(member.settings.wiring, Wiring::Shared);
         let sides = [Side::Upstream, Side::Downstream];
         for (watched, side) in self.watched.iter_mut().zip(sides) {
@@ -224,7 +210,7 @@ impl Reporting {
                 from = watched.own_from;
             } else if is_spread {
                 // If all drones have the same fault, the relays farther from the station report first.
-                let behind = member.all.saturating_sub(from_end(member, side)) % 8;
+                let behind = member.all.saturating_sub(member.relays_to_end(side)) % 8;
                 from = from + SPREAD.times(behind.into());
             }
             from = from.max(self.reported + STEP);
@@ -241,9 +227,7 @@ impl Reporting {
                 watched.heard = now;
             }
             // The relay four numbers farther from the station reports to the station itself.
-            if from == beyond(member, side.other(), CANDIDATES)
-                && to == beyond(member, side, from_end(member, side))
-            {
+            if from == member.beyond(side.other(), CANDIDATES) && to == member.station(side) {
                 (watched.confirmed, watched.unconfirmed) = (now, DIRECT);
             }
         }
@@ -302,9 +286,9 @@ impl Reporting {
                 let to = if distance == 1 {
                     neighbours.at(away).node()
                 } else {
-                    beyond(member, away, distance)
+                    member.beyond(away, distance)
                 };
-                if is_relay(member, to) {
+                if member.is_relay(to) {
                     let mission = member.digest;
                     if distance == CANDIDATES && now >= watched.confirmed + UNCONFIRMED {
                         // It may have restarted: then it accepts only handshakes.
@@ -317,7 +301,7 @@ impl Reporting {
                 }
             }
             if watched.report_at(wait).is_some_and(|at| now >= at)
-                && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
+                && let Some(to) = watched.to.or_else(|| neighbours.next(member, side))
                 && let Some(report) = self.report(now, member, neighbours, side, own)
             {
                 return Some((side, to, Message::Report(report)));
@@ -377,35 +361,13 @@ const fn begins_alarm(before: u16, now: u16) -> bool {
     before != now && before != 0 && (is_fault || is_released)
 }
 
-const fn is_relay(member: &Member, node: u16) -> bool {
-    node >= 1 && node <= member.all
-}
-
-/// Returns the node `distance` numbers away at `side`.
-const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
-    match side {
-        Side::Upstream => member.node.saturating_sub(distance),
-        Side::Downstream => member.node.saturating_add(distance),
-    }
-}
-
-/// Returns the neighbour at `side`, or Tx for relay 1 and Rx for relay N without a neighbour. `None` while there is
-/// neither a neighbour nor a ground station.
-fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
-    let end = beyond(member, side, 1);
-    match neighbours.at(side).node() {
-        0 => Some(end).filter(|end| !is_relay(member, *end)),
-        node => Some(node),
-    }
-}
-
 impl Watched {
     /// Ends the reports 60 s after the last request for them, and drops silent destinations.
     ///
     /// A destination is dropped if it has sent no request for 55 s, or no frame for 2.5 s (a relay) or 7.5 s (a
     /// station).
     fn expire(&mut self, now: Instant, member: &Member) {
-        let is_relay = self.to.is_some_and(|to| is_relay(member, to));
+        let is_relay = self.to.is_some_and(|to| member.is_relay(to));
         let is_unheard = now >= self.heard + UNHEARD.times(if is_relay { 1 } else { 3 });
         if now >= self.until {
             *self = Self::default();
@@ -569,8 +531,7 @@ impl Reporting {
         side: Side,
         own: Own,
     ) -> Option<Reports> {
-        let byte = self.byte_time(now, member, side);
-        let period = period(member, side, byte);
+        let (period, byte) = self.rate(now, member, side);
         let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
         let (control, power_w) = (self.control, self.power_w);
         let reported = self.reported;
@@ -671,40 +632,36 @@ impl Reporting {
         (entries > 0).then_some(report)
     }
 
-    /// Returns the time between two reports, divided by the length of the first report in bytes. With this time the
-    /// reports of all relays take an eleventh of the data rate.
+    /// Returns the time between two reports, and this time divided by the length of a report in bytes. The reports of
+    /// all relays then take an eleventh of the data rate.
     ///
-    /// The data rate is assumed to be one `Sweep` message in each `hop_time`. On a shared channel it is also at least
-    /// 2350 bytes for each relay in each `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). The reports use a
-    /// tenth of these bytes, divided among the relays in proportion to their loads.
-    fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
+    /// The data rate is assumed to be one sweep in each `hop_time`. On a shared channel it is also at least 2350 bytes
+    /// for each relay in each `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). The reports use a tenth of these
+    /// bytes, divided among the relays in proportion to their loads. On wires the time is that of the relay nearest to
+    /// the station, because this relay has the most to send.
+    fn rate(&self, now: Instant, member: &Member, side: Side) -> (Duration, Duration) {
         let settings = &member.settings;
         let hop = (settings.hop_time.as_micros() * 108 / 1_200).clamp(1, 1 << 24);
-        let hop = u32::try_from(hop).unwrap_or(u32::MAX);
-        let alone = match settings.wiring {
-            Wiring::Pair => hop.into(),
+        let relays = u32::from(member.all);
+        let wires = 28 * (relays + 1); // an eighth is in reserve
+        let (own, all, byte) = match settings.wiring {
+            Wiring::Pair => (wires, wires, hop),
             Wiring::Shared => {
-                let (all, own) = (all_loads(member), load(member, from_end(member, side)));
-                let by_hop = (u64::from(16 * all / own) * u64::from(hop)) >> 4;
-                let of_mean = 256 * all / (own * u32::from(member.all)).max(1);
-                by_hop.min((of_mean * (micros(settings.probe_after) / (256 * 235))).into())
+                let most = micros(settings.probe_after) / (235 * relays);
+                let own = load(member, member.relays_to_end(side));
+                (own, all_loads(member), hop.min(most.into()))
             }
         };
         let is_both = self.watched.iter().all(|watched| now < watched.until);
-        Duration::from_micros(if is_both { alone * 5 / 2 } else { alone })
+        let byte = if is_both { byte * 5 / 2 } else { byte };
+        let period = u64::from(all) * byte;
+        let byte = Duration::from_micros(period / u64::from(own));
+        (Duration::from_micros(period).max(LEAST_PERIOD), byte)
     }
 }
 
 fn micros(span: Duration) -> u32 {
     u32::try_from(span.as_micros()).unwrap_or(u32::MAX)
-}
-
-/// Returns the number of relays from this relay (included) to the end of the chain at `side`.
-const fn from_end(member: &Member, side: Side) -> u16 {
-    match side {
-        Side::Upstream => member.node,
-        Side::Downstream => member.all.saturating_sub(member.node).saturating_add(1),
-    }
 }
 
 /// Returns the number of bytes that a relay is assumed to report in each period. `distance` is the difference between
@@ -722,16 +679,6 @@ const fn all_loads(member: &Member) -> u32 {
     let all = member.all as u32;
     let (eights, rest) = (all / 8, all % 8);
     SHARE * (2 * all + 4 * eights * eights.saturating_sub(1) + rest * eights)
-}
-
-/// Returns the time between two reports of a relay. On wires the result is the time of the relay nearest to the
-/// station, because this relay has the most to send.
-fn period(member: &Member, side: Side, byte: Duration) -> Duration {
-    let bytes = match member.settings.wiring {
-        Wiring::Pair => 28 * (u32::from(member.all) + 1), // an eighth is in reserve
-        Wiring::Shared => load(member, from_end(member, side)),
-    };
-    byte.times(bytes).max(LEAST_PERIOD)
 }
 
 /// Returns the age at `now` of a state that existed at the time `at`, in tenths of a second, rounded. The age includes

@@ -158,7 +158,7 @@ pub(super) fn poll_transmit(
         if let Some((_, to)) = node.poll_claim() {
             session.request_reply(to);
         }
-        if let Some(to) = node.poll_greeting() {
+        if let Some(to) = node.reporting.poll_greeting() {
             session.request_reply(to);
         }
         session.pin(node.neighbours());

@@ -150,6 +150,7 @@ function describe() {
   byId("changes").replaceChildren(...lines.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
   // An uploaded mission may have another line, and the map other coordinates.
   map.targets = state.stage === "ready" ? shown.targets : [];
+  byId("previewed").hidden = !map.targets.length;
   map.request();
 }
 

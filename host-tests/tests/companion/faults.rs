@@ -147,17 +147,26 @@ fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
             [0.0, MOST.as_secs_f64()]
         };
         let noticed_s = own.unwrap_or(most_s).clamp(least_s, most_s);
-        let is_soon = shown.is_some_and(|shown| shown <= noticed_s + SOON_S);
-        if !is_soon {
+        let limit_s = noticed_s + SOON_S;
+        if shown.is_none_or(|shown| shown > limit_s) {
+            let shown = shown.map_or("no alarm".to_owned(), |it| format!("alarm after {it:.1} s"));
             failures.push(format!(
-                "{what} {relay}: {shown:.1?}, noticed after {own_s}"
+                "{what} {relay}: {shown}, permitted until {limit_s:.1} s; noticed by a companion: {own_s}"
             ));
         }
     }
     failures
 }
 
-/// State of a relay by its own status and log, since the present group of faults began.
+/// Formats a group of faults that happen at the same time: "pilot 3, gps 6".
+fn name(group: &[Fault]) -> String {
+    let all = group
+        .iter()
+        .map(|(what, relay, ..)| format!("{what} {relay}"));
+    all.collect::<Vec<_>>().join(", ")
+}
+
+/// State of a relay by its own status and log, since the begin of the present group of faults.
 #[derive(Clone, Debug, Default)]
 struct Own {
     /// Queries of the relay's status: time, s, and true if the relay had a setpoint but no lease.
@@ -378,7 +387,7 @@ impl Stage {
                 it["text"], it["time_s"], it["cleared_s"], it["urgency"]
             );
             if it["cleared_s"].is_null() {
-                failures.push(format!("{group:?}: does not end: {it}"));
+                failures.push(format!("{}: alarm does not end: {it}", name(group)));
             }
         }
         self.check_others(group, &new, failures);
@@ -395,7 +404,10 @@ impl Stage {
             };
             let times = new.iter().filter(of).count();
             if times != 1 {
-                failures.push(format!("{fault:?}: {times} alarms"));
+                let [what, text] = [name(&[*fault]), text(fault)];
+                failures.push(format!(
+                    "{what}: {times} alarms that begin with {text:?}, must be 1"
+                ));
             }
         }
     }
@@ -405,6 +417,7 @@ impl Stage {
     /// Exceptions are true alarms about a lease or the quorum, if the group of faults takes several relays or the
     /// quorum from the chain.
     fn check_others(&mut self, group: &[Fault], new: &[Value], failures: &mut Vec<String>) {
+        let of = name(group);
         let hurt: Vec<usize> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
         // With both ends or most relays lost, the rest of the chain has no lease for a while, and may have no quorum.
         let is_torn =
@@ -415,18 +428,17 @@ impl Stage {
             let is_own = by.is_some() || text.contains(LEASE);
             let others = subjects(by.unwrap_or(text)).any(|it| !hurt.contains(&it));
             if others && !(is_own && is_torn) {
-                failures.push(format!("{group:?}: a relay without a fault: {text}"));
+                failures.push(format!("{of}: alarm about a relay without a fault: {text}"));
             }
         }
         let untrue = std::mem::take(&mut self.untrue).into_iter();
-        failures.extend(untrue.map(|it| format!("{group:?}: untrue: {it}")));
+        failures
+            .extend(untrue.map(|it| format!("{of}: the relay's own state contradicts it: {it}")));
         let longest_s: Vec<f64> = self.own.iter().map(Own::longest_s).collect();
         println!("  longest times without a lease, by the relays: {longest_s:.1?} s");
         let most_s = longest_s.into_iter().fold(0.0, f64::max);
         if most_s > EXPIRED_S + SOON_S + NEAR_S && !self.has_expired {
-            failures.push(format!(
-                "{group:?}: no lease for {most_s:.1} s, but no alarm"
-            ));
+            failures.push(format!("{of}: no lease for {most_s:.1} s, but no alarm"));
         }
     }
 

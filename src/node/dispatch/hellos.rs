@@ -36,17 +36,13 @@ impl Node {
 
     /// Returns the next pending hello with its side and destination node; `None` if none is pending.
     pub(super) fn next_hello(&mut self, now: Instant) -> Option<(Side, u16, Hello)> {
-        let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {
             for _ in 0..CANDIDATES {
                 let Some((distance, ask)) = self.layers.neighbours.at_mut(side).poll_hello() else {
                     break;
                 };
-                let to = match side {
-                    Side::Upstream => own.saturating_sub(distance),
-                    Side::Downstream => own.saturating_add(distance),
-                };
-                if to >= 1 && to <= all && self.side_of(to).is_some() {
+                let to = self.member.beyond(side, distance);
+                if self.member.is_relay(to) && self.side_of(to).is_some() {
                     let offer_number = self.layers.update.next_offer_number(now, &self.member);
                     let mut hello = self.hello(now, side, ask, offer_number);
                     if hello.outside {

@@ -61,10 +61,7 @@ impl Node {
     ///
     /// The message is a hello or the requested upload; `None` if neither is pending.
     pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
-        let to = match side {
-            Side::Upstream => 0,
-            Side::Downstream => self.member.all.saturating_add(1),
-        };
+        let to = self.member.station(side);
         if !self.layers.update.poll_report(side) {
             let (upload, offer_number) = self.layers.update.poll_requested(side)?;
             return Some((

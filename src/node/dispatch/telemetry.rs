@@ -2,14 +2,23 @@
 
 use super::Node;
 use crate::features::{AUTH, TELEMETRY};
-use crate::node::context::Member;
-use crate::node::reports::{FIRST_PATIENCE, Own, PATIENCE};
 use crate::node::round::state::Phase;
+use crate::place::Placement;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::CANDIDATES;
 use crate::wire::message::Message;
+
+/// Maximum time by which telemetry waits on a shared channel while the relays agree on positions.
+const PATIENCE: Duration = Duration::from_millis(2_000);
+
+/// Maximum time by which telemetry waits on a shared channel during the first agreement.
+const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
+
+/// State that this relay reports about itself. The values are the number of the state in an entry (without the control
+/// state), its [refusals](crate::wire::message::Entry::refusal) toward Tx and toward Rx, the setpoint, and the agreed position.
+pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
 impl Node {
     /// Handles a telemetry message of node `from` at `side`: a Watch (request for reports) or a Report. The node need
@@ -35,12 +44,6 @@ impl Node {
     /// Records that a frame of node `from` to node `to` was received on the shared channel.
     pub(crate) fn on_channel(&mut self, now: Instant, from: u16, to: u16) {
         self.reporting.handle_frame(now, &self.member, from, to);
-    }
-
-    /// Returns the next node to which a handshake must be sent, because no report of this node has arrived. `None` if
-    /// there is no such node.
-    pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
-        self.reporting.poll_greeting()
     }
 
     /// Returns the next telemetry message (Watch or Report) with its side and its destination. `None` if none is
@@ -97,11 +100,10 @@ impl Node {
         if !TELEMETRY {
             return [0; 2];
         }
-        let Member { node, all, .. } = self.member;
-        let neighbours = &self.layers.neighbours;
-        let before = neighbours.at(Side::Upstream).refused(now, node);
-        let end = all.saturating_add(1).saturating_sub(node);
-        let after = neighbours.at(Side::Downstream).refused(now, end);
+        let [before, after] = [Side::Upstream, Side::Downstream].map(|side| {
+            let neighbour = self.layers.neighbours.at(side);
+            neighbour.refused(now, self.member.relays_to_end(side))
+        });
         let mut kinds = before.into_iter().zip(after).zip([0, 2 * CANDIDATES]);
         // A mission is refused by its signed digest; the other key may be a forger's.
         let kind = kinds.find(|(nodes, _)| *nodes != (0, 0));
@@ -115,7 +117,7 @@ impl Node {
     /// wrong mission or a wrong key. `before` has the earlier result of [`Self::refusals`].
     pub(super) fn report_refusal(&mut self, now: Instant, before: [u16; 2]) {
         if before == [0; 2] && self.refusals(now) != [0; 2] {
-            self.reporting.handle_refusal(&self.member);
+            self.reporting.schedule(&self.member, true);
         }
     }
 }

@@ -12,7 +12,7 @@ pub(crate) mod hearing;
 pub(crate) mod liveness;
 pub(crate) mod state;
 
-use super::context::earliest;
+use super::context::{Member, earliest};
 use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::Instant;
@@ -69,6 +69,15 @@ impl Neighbours {
     /// Returns the node numbers of the neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub(crate) fn nodes(&self) -> [Option<u16>; 2] {
         [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
+    }
+
+    /// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one. `None` while there is neither.
+    pub(crate) fn next(&self, member: &Member, side: Side) -> Option<u16> {
+        let end = member.beyond(side, 1);
+        match self.at(side).node() {
+            0 => Some(end).filter(|end| !member.is_relay(*end)),
+            node => Some(node),
+        }
     }
 
     /// Returns true if a neighbour has changed since the last decision on a view.

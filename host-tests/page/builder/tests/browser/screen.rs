@@ -395,6 +395,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     }
     // The preview on the page is that of another browser.
     assert_eq!(browser.value("byId('hold').disabled"), true);
+    assert_eq!(browser.value("byId('previewed').checkVisibility()"), true);
     browser.run("byId('form').elements.altitude.value = ' 30 '; byId('form').requestSubmit()");
     let task = next();
     assert_eq!(
@@ -924,6 +925,15 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
                     "document.documentElement.scrollWidth - window.innerWidth",
                 );
                 assert!(over <= 0.0, "{name} {scheme} {what}: {over} px too wide");
+                // On a phone the table scrolls. The longest phase, and the column of the other direction, fit too.
+                let cut = number(
+                    &mut browser,
+                    "(() => { const plain = received.last, last = structuredClone(plain); for (const it of last.relays) it.phase = 'waiting for the chain'; for (const it of last.hops) it.sir_back_db = -12.3; show(last); const table = byId('table'), cut = table.scrollWidth - table.parentElement.clientWidth; show(plain); return cut; })()",
+                );
+                assert!(
+                    cut <= 0.0 || width < 900,
+                    "{name} {scheme} {what}: the table is {cut} px too wide"
+                );
                 let small = browser.value(
                     "[...document.querySelectorAll('button')].filter((it) => it.checkVisibility()).map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
                 );
