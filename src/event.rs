@@ -51,9 +51,9 @@ pub enum Event {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node's mission differs from this relay's mission, or is one that this relay cannot obtain. The node's messages
-    /// are ignored. An operator loads the same mission into both nodes before take-off. Raised once a minute for each
-    /// node.
+    /// A node has loaded a different mission before flight, or flies one that this relay cannot obtain. The node's
+    /// messages are ignored. An operator loads the same mission into both nodes before take-off. Raised once a minute
+    /// for each node.
     MissionMismatch {
         /// Index of the node whose mission is not this relay's mission.
         node: u16,
