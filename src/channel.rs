@@ -28,7 +28,8 @@ pub enum AirGround {
 pub struct Channel {
     /// Path-loss factor between two drones, which have line of sight, 1/m^2.
     mu_los: f64,
-    /// Path-loss factor without line of sight, 1/m^2; applies from the interferer to the ground receiver.
+    /// Path-loss factor without line of sight, 1/m^2. It applies to the path from the interferer to the ground
+    /// receiver.
     mu_nlos: f64,
     /// Path-loss factor between a drone and a station on the ground, 1/m^2; the same in both directions.
     eta: f64,
@@ -150,7 +151,8 @@ impl Channel {
         }
     }
 
-    /// Path-loss factor between two drones, 1/m^2. A receiver at d metres from P watts receives P / (factor d^2).
+    /// Path-loss factor between two drones, 1/m^2. At a distance of d metres from a transmitter of P watts, a receiver
+    /// receives P / (factor d^2) watts.
     pub const fn mu_los(&self) -> f64 {
         self.mu_los
     }

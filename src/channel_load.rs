@@ -27,19 +27,19 @@ const FRAMES: u64 = 8;
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3/20. The rest is for all further
-/// messages, for retransmissions, and for waits until the channel is free.
+/// Maximum fraction of the channel's capacity that the frames of an idle chain may take: 3/20. The rest is left for
+/// other messages, for retransmissions, and for waits until the channel is free.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Maximum number of relays in range for which a transmission is assumed to start without a wait.
+/// Maximum number of relays in range at which a transmission is assumed to take one frame time.
 ///
-/// A transmission takes one frame time for up to nine relays, two frame times for up to 18, and so on, up to
-/// [`MOST_TURNS`]. The nine relays are this relay, four toward Tx and four toward Rx.
+/// With more than nine relays a transmission is assumed to take two frame times, with more than 18 three, up to
+/// [`MOST_TURNS`], because it waits for the channel. The nine relays are this relay, four toward Tx and four toward Rx.
 const NEAR: u16 = 9;
 
-/// Maximum time assumed for one transmission with the wait for the channel, in frame times.
+/// Maximum time assumed for one transmission including the wait for the channel, in frame times.
 const MOST_TURNS: u32 = 4;
 
 /// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
@@ -48,7 +48,7 @@ const MOST_TURNS: u32 = 4;
 pub struct ChannelLoad {
     /// Number of relays in range of each other, 1 to 1000.
     pub in_range: u16,
-    /// Overhead of a frame (preamble, turnaround of the radio), converted to bytes.
+    /// Overhead of a frame (preamble, turnaround of the radio), as a number of bytes of the same duration.
     pub overhead: u16,
 }
 
@@ -62,9 +62,10 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the bits to carry in one `probe_after`, times 1e6, at the permitted use of the channel.
+    /// Returns the minimum data rate for this load, bit/s, times `probe_after` in microseconds.
     ///
-    /// The result divided by `probe_after` in microseconds is the minimum data rate in bit/s.
+    /// The result is the number of bits that an idle chain sends within `probe_after`, divided by the permitted
+    /// fraction [`SHARE`] of the channel, times 1e6.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
@@ -93,7 +94,7 @@ impl ChannelLoad {
         baud
     }
 
-    /// Checks that a channel of `baud` bit/s carries the relays with this `probe_after`.
+    /// Checks that a channel of `baud` bit/s has enough capacity for these relays with this `probe_after`.
     ///
     /// `cargo chain`, `cargo provision` and the Linux companion use this check.
     ///
@@ -163,7 +164,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the time assumed for one transmission with the wait for the channel, in frame times.
+    /// Returns the time assumed for one transmission including the wait for the channel, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -173,12 +174,12 @@ impl ChannelLoad {
     }
 }
 
-/// Error of [`ChannelLoad::carried`]: the channel is overloaded. Each field except `in_range` is a limit that would
-/// avoid this: a faster channel, a longer `probe_after`, or fewer relays.
+/// Error of [`ChannelLoad::carried`]: the channel is overloaded. Each field except `in_range` states one way to avoid
+/// this: a faster channel, a longer `probe_after`, or fewer relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
-    /// Number of relays in range of each other that overload the channel.
+    /// Number of relays in range of each other, with which the channel is overloaded.
     pub in_range: u16,
     /// Minimum data rate of a channel that carries these relays, bit/s.
     pub least_baud: u32,

@@ -51,9 +51,9 @@ pub enum Event {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node's mission differs from this relay's mission, or is one that this relay cannot obtain. The node's messages
-    /// are ignored. An operator loads the same mission into both nodes before take-off. Raised once a minute for each
-    /// node.
+    /// A node has loaded a different mission before flight, or flies one that this relay cannot obtain. The node's
+    /// messages are ignored. An operator loads the same mission into both nodes before take-off. Raised once a minute
+    /// for each node.
     MissionMismatch {
         /// Index of the node whose mission is not this relay's mission.
         node: u16,
@@ -76,7 +76,7 @@ pub enum Event {
     /// recorded frame does not raise the event, but a replay in order of five handshakes of one start does. If `node`
     /// is this relay, its neighbours know a newer epoch, and this relay becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
-        /// Index of the node whose epoch went back.
+        /// Index of the node whose epoch (start counter) is too old.
         node: u16,
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
@@ -91,12 +91,12 @@ pub enum Event {
     /// The chain has agreed on its members (a new view). `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired. The relay keeps its setpoint and requests a new view, because the members no longer have
-    /// to keep to the last agreement. Not raised again before a view is agreed on.
+    /// The lease has expired: the time for which all members keep to their last agreement. The relay keeps its setpoint
+    /// and requests a new view (list of members). Not raised again before a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused because too few relays are reachable for a quorum. The relays of this part of the chain
-    /// hold their positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or
-    /// land the drones of this part of the chain.
+    /// A new view (list of members) was refused because too few relays are reachable for a quorum. The relays of this
+    /// part of the chain hold their positions. Not raised again before a view is agreed on. Bring the missing relays
+    /// back into range, or land the drones of this part of the chain.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
@@ -106,7 +106,7 @@ pub enum Event {
     /// exceeds this relay's own geofence. The mission has fitted slots (as long as each hop needs), which the settings
     /// do not allow. Upload a corrected mission. The event is raised once for each rejected mission.
     UploadRefused {
-        /// Reason for the rejection.
+        /// Reason for the rejection of the newer mission.
         why: LineError,
     },
     /// The relay's estimate of the interference has changed (`Relay::interference_estimate`). New positions follow.
@@ -114,7 +114,7 @@ pub enum Event {
     /// The leader cannot locate the interferer. The measurements are too few, contradict each other, or do not fit a
     /// single source on the ground. Raised at the leader. `Relay::unfit` gives the reason.
     InterfererUnclear,
-    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit.
+    /// A node's measurements do not fit those of all other nodes. The measurements are ignored until they fit.
     ///
     /// An operator should check the receiver of this node. Only the leader raises this event for the transmitter and
     /// the receiver. If a relay measures nothing at all, only this relay raises the event, with itself as the node.
@@ -133,9 +133,9 @@ pub enum Event {
     /// The drone's remaining time of flight is unknown. Raised only if a reserve is set (`Relay::set_reserve`).
     ///
     /// Raised if a value of `Relay::handle_endurance` was invalid, if no value came for 10 s, or if no value is known
-    /// while the relay controls the drone. The relay then counts down from the last value that agreed with its
-    /// predecessor. If there is no such value, it counts down from the last value. Without any valid value, the relay
-    /// does not leave the chain by itself. Raised at most once a minute while the time is unknown.
+    /// while the relay controls the drone. The relay then counts the time down from the last value that agreed with the
+    /// value before it, or else from the last value. Without any valid value, the relay does not leave the chain by
+    /// itself. Raised at most once a minute while the time is unknown.
     EnduranceUnknown,
     /// The drone's remaining time of flight is only enough for the way home and the reserve. `Relay::set_reserve` sets
     /// the reserve. Raised again every minute while this is the case.
@@ -195,7 +195,7 @@ pub(crate) enum NodeEvent {
     Mission,
     Key,
     Epoch,
-    /// Two nodes use the same index. If the index is this relay's own, the stored side has no meaning.
+    /// Two nodes use the same index. If it is this relay's own index, the event is stored for the upstream side.
     Index,
     /// The measurements of the node do not fit those of all other nodes.
     Sensor,

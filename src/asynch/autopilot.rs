@@ -20,8 +20,8 @@ use crate::time::Duration;
 
 /// Pause after an operation on the autopilot's port has failed, or has transferred no byte.
 ///
-/// Also the minimum time between two data exchanges with the relay. An exchange starts earlier if bytes are received or
-/// the relay raises an event.
+/// Also the minimum time between two data exchanges with the relay that a timer starts. Received bytes and events of
+/// the relay start an exchange at once.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.
@@ -48,7 +48,7 @@ impl fmt::Debug for AsyncAutopilot {
 }
 
 impl AsyncAutopilot {
-    /// Creates a link that several tasks can share, from `link`.
+    /// Creates a link that several tasks can share. It contains the given autopilot link `link`.
     pub const fn new(link: Autopilot) -> Self {
         Self {
             link: RefCell::new(link),
@@ -58,11 +58,11 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Passes an event of the relay to the autopilot link. The operator is informed of events that matter in flight,
-    /// and a new setpoint is sent to the autopilot at once.
+    /// Passes an event of the relay to the autopilot link. The operator is sent a text about events such as a lost
+    /// neighbour, and the autopilot is sent a new setpoint at once.
     ///
-    /// Without this call the autopilot receives a new setpoint with the next periodic target, within a second. Constant
-    /// work.
+    /// Without this call a new setpoint reaches the autopilot with the next data exchange that a timer starts, within a
+    /// second. Constant work.
     pub fn handle_event(&self, event: Event) {
         if let Ok(mut link) = self.link.try_borrow_mut() {
             link.handle_event(event);

@@ -22,7 +22,8 @@ const PAUSE: u32 = 128;
 
 /// Time in byte times for which the driver-enable pin stays high after the last byte's computed end.
 ///
-/// One byte time is for a byte that the port may still be sending. The second is for the tolerance of the port's clock.
+/// The first byte time covers a byte that the port may still be sending. The second covers the tolerance of the port's
+/// clock.
 const PIN_HOLD: u32 = 2;
 
 /// Delimiter byte that ends every frame. After a frame that was cut off, an extra delimiter is sent before the next

@@ -197,8 +197,8 @@ where
     }
 }
 
-/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus with
-/// a driver-enable pin.
+/// Port of a relay on a shared channel, on which every neighbour receives each frame. The port leads to a radio modem,
+/// or to a half-duplex bus with a driver-enable pin.
 ///
 /// The modem controls the access to the channel. This crate only keeps relays from retransmitting at the same times.
 #[derive(Debug)]

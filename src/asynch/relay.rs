@@ -15,7 +15,7 @@ use crate::serial::SerialStats;
 /// holds the relay across an `await`. An interrupt passes its data to such a task through a channel.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// True if the relay has got new input since the task of its ports last handled it.
+    /// True if the relay has new input that the task of its ports has not handled yet.
     changed: Cell<bool>,
     /// Waker of the task that runs the relay's ports.
     runner: Cell<Option<Waker>>,
@@ -35,7 +35,7 @@ impl fmt::Debug for AsyncRelay<'_> {
 }
 
 impl<'a> AsyncRelay<'a> {
-    /// Creates a relay that several tasks can share, from `relay`.
+    /// Creates a relay that several tasks can share. It borrows the given `relay`.
     pub fn new(relay: &'a mut Relay) -> Self {
         Self {
             relay: RefCell::new(relay),
@@ -81,8 +81,8 @@ impl<'a> AsyncRelay<'a> {
         self.counters(port).get()
     }
 
-    /// Passes the relay to `work` without waking the task of the ports. Returns `None` if called from within a closure
-    /// that already has the relay.
+    /// Passes the relay to `work` without waking the task of the ports. Returns `None`, and does nothing, if called
+    /// from within the closure of a different call that has borrowed the relay.
     pub(super) fn lend<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }

@@ -66,7 +66,8 @@ pub struct Estimate {
     pub alpha: f32,
     /// Second shape parameter of the Beta distribution fitted to I / `I_max`, above 0.
     pub beta: f32,
-    /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32. The value is valid for a point of a [`Field`](super::Field).
+    /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32. This is the range that a point of a [`Field`](super::Field)
+    /// permits.
     pub upsilon_per_w: f32,
     /// Standard error of `upsilon_per_w`, 1/W, above 0. The true Upsilon is within two standard errors of the
     /// estimate with a probability of about 95 %.
@@ -81,8 +82,8 @@ pub struct Estimate {
 impl Estimator {
     /// Minimum number of accepted samples for an estimate.
     ///
-    /// An estimate from 100 samples can still be bad. With 100 samples and a true shape parameter alpha below 1.5, most
-    /// estimates exist only because alpha is overestimated by chance. The estimated Upsilon is then too low.
+    /// An estimate from 100 samples can still be bad. If the true shape parameter alpha is below 1.5, most sets of 100
+    /// samples that give an estimate overestimate alpha by chance. The estimated Upsilon is then too low.
     pub const MIN_SAMPLES: u32 = 100;
 
     /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.

@@ -32,7 +32,7 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Maximum difference between a mission's distance and the distance of its Tx and Rx positions, m. Allows for rounding.
+/// Maximum difference between a mission's distance and the length of its line from Tx to Rx, m. Allows for rounding.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why the positions of Tx and Rx define no line.
@@ -351,7 +351,8 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns half the length of an arc of the radius `radius`, m. `chord` is half the length of the arc's chord, m.
+/// Returns half the length of an arc, m. `chord` is half the length of the arc's chord, m, and `radius` the radius of
+/// the arc, m.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)

@@ -14,7 +14,7 @@ pub struct Course {
     pub pace: Pace,
 }
 
-/// Reason why the positions of Tx and Rx contradict the mission.
+/// Reason why the positions of Tx and Rx do not fit the mission, or define no line.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

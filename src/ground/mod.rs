@@ -28,7 +28,7 @@ use crate::wire::message::{Detail, Entry, Hello, Message, Reports};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Time without a frame of a relay after which a different node with the same number is accepted. Relays use
+/// Time from a relay's last frame until a different node with the same number is accepted. Relays use
 /// `Settings::dead_after` instead.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
@@ -39,7 +39,7 @@ const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 /// `telemetry`.
 const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 
-/// Interval in which each relay in radio reach of the station is requested once to report all relays.
+/// Interval in which every relay in radio reach is sent one request for the reports of all relays.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
 /// Number of unanswered hellos (status requests) to one relay after which the next relay is polled.
@@ -85,7 +85,7 @@ pub struct Ground {
     base: u16,
     end: Side,
     node: u16,
-    /// Number of relays in direct reach of the station: one over a wire, up to four over a shared channel.
+    /// Number of relays that can receive the station: one over a wire, up to four over a shared channel.
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
@@ -100,7 +100,8 @@ pub struct Ground {
     relay_mission: Option<MissionId>,
     /// True after the station has sent a hello (status request), until the polled relay sends a hello.
     query_sent: bool,
-    /// Number in the polled relay's last hello, to be repeated in the mission offer. `None` if no offer is due.
+    /// Number in the polled relay's last hello. The station repeats this number when it offers the mission. `None` if
+    /// no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
@@ -209,7 +210,7 @@ impl Ground {
     /// Sends the interference measured at this station to the relays in reach.
     ///
     /// `power_w` is the mean received power, with the receiver's noise but without the signals of transmitter and
-    /// relays. Average long enough for the relative error of [`Listen`](crate::Listen). One measurement per
+    /// relays. Average for so long that its relative error is that of [`Listen`](crate::Listen). One measurement per
     /// [`Listen::every`](crate::Listen::every) is enough. Returns false, and does nothing, if `power_w` is outside
     /// 1e-30 to 1e6 W.
     ///
@@ -233,8 +234,8 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of intact frames that were rejected. The reasons are a sender out of reach or with a
-    /// different mission, and a frame that is forged, replayed or malformed.
+    /// Returns the number of intact frames that the station rejected. The reasons are a sender out of radio reach, a
+    /// sender with a different mission, and a frame that is unsigned, forged, replayed or malformed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -254,7 +255,8 @@ impl Ground {
     /// Returns the node numbers of the relays in direct reach, nearest first. The second value is true if the relay has
     /// proven that it has the key.
     ///
-    /// After a new handshake, the value is false until the relay answers. Work: four relays at most.
+    /// After a new handshake with a relay, the value for this relay is false until the relay answers. Work: four relays
+    /// at most.
     pub fn relays_in_reach(&self) -> impl Iterator<Item = (u16, bool)> {
         let nodes = (1..=self.reach).map(|distance| self.at(distance));
         nodes.map(|node| (node, self.endpoint.knows(node)))
@@ -440,7 +442,10 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next hello if it is due: to the polled relay, or to the next relay. Takes constant time.
+    /// Schedules the next hello if it is due. Takes constant time.
+    ///
+    /// The hello goes to the polled relay. If that relay has left three hellos unanswered, it goes to the next relay,
+    /// which is then the polled one.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if TELEMETRY {
@@ -493,8 +498,8 @@ impl Ground {
         Some(self.clock.external(next?))
     }
 
-    /// Writes the next frame into `frame` and returns its length, bytes. `None` if there is none. Work: one frame and
-    /// one tag.
+    /// Writes the next frame into `frame` and returns its length, bytes. `None` if there is none. Work: one frame is
+    /// encoded, and one authentication tag computed.
     pub fn poll_transmit(&mut self, frame: &mut [u8; MAX_FRAME]) -> Option<usize> {
         if self.endpoint.is_exhausted() {
             return None;
@@ -550,8 +555,8 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Writes the interference report to the next relay; `None` if no report is pending. If the relay cannot verify
-    /// frames of this station yet, a handshake is written instead of the report.
+    /// Writes the interference report for the next relay that needs it; `None` if no report is pending. If the relay
+    /// cannot verify frames of this station yet, a handshake is written instead of the report.
     fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {
@@ -562,7 +567,7 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Writes the request for reports to the next relay in reach; `None` if none is pending.
+    /// Writes a request for the reports of all relays, to the next relay in reach. `None` if none is pending.
     fn next_watch(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         if !core::mem::take(&mut self.watching.is_due) {
             return None;
@@ -606,7 +611,7 @@ struct Watching {
     all: u16,
     /// Number of nearest relays to send requests to: one over a wire, up to eight over a shared channel.
     reach: u16,
-    /// Bit mask of relays that have sent a frame to any node since the last request to the relay.
+    /// Bit mask of relays. A relay's bit is set if it has sent a frame to any node since the last request to it.
     overheard: u8,
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
@@ -615,7 +620,7 @@ struct Watching {
     /// until the request is sent.
     distance: u16,
     is_due: bool,
-    /// Bit mask of relays that have sent a message to this station since the last request to the relay.
+    /// Bit mask of relays. A relay's bit is set if it has sent a message to this station since the last request to it.
     heard: u8,
     /// Report entries received since the last call of [`apply`](Self::apply). That call sets their arrival time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
@@ -657,8 +662,9 @@ impl Watching {
         }
     }
 
-    /// Schedules a request for reports, if due, to the next relay. The farthest relay comes first. A relay at a
-    /// distance above 4 is left out before the first report, and if it has sent no frame since the last request to it.
+    /// Schedules a request for reports, if due, to the next relay, from the farthest to the nearest. A relay at a
+    /// distance above 4 is left out until a first report has been received, and while it has sent no frame since the
+    /// last request to it.
     ///
     /// Returns true if the scheduled relay has sent no message to this station since the last request to it.
     fn request(&mut self, now: Instant, node: u64) -> bool {
@@ -690,7 +696,8 @@ impl Watching {
         is_silent
     }
 
-    /// Schedules another request for reports to the relay at `distance`. The relay could not verify an earlier request.
+    /// Schedules another request to the relay at `distance`, for reports. The relay could not verify an earlier
+    /// request.
     const fn answer(&mut self, distance: u16) {
         if self.repeat_at.is_some() && !self.is_due {
             self.distance = distance;

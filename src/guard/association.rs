@@ -55,7 +55,7 @@ pub(super) struct Association {
     /// True while the messages to the neighbour request an open chain. In an open chain all relays are at least the
     /// minimum separation apart along x.
     open_sent: bool,
-    /// Number of reminders, one per second, until the neighbour's halt request expires. 0 without a halt request.
+    /// Number of seconds (reminders) until the neighbour's halt request expires. 0 without a halt request.
     halt_reminders_left: u8,
     /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
@@ -67,7 +67,7 @@ pub(super) struct Association {
     leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, m, in any association (session); NaN if none has been received.
     seen_m: f32,
-    /// Number of reminders, one per second, until the neighbour's last x expires.
+    /// Number of seconds (reminders) until the neighbour's last x expires.
     seen_reminders_left: u8,
 }
 
@@ -97,14 +97,14 @@ impl Association {
         self.node == 0 || self.is_absent()
     }
 
-    /// Stores the neighbour's x from a message, `x_m`. This x expires after 15 reminders (seconds) without another
-    /// message.
+    /// Stores the neighbour's x from a message, `x_m`. This x expires after 15 s without another message.
     pub(super) const fn record_x(&mut self, x_m: f32) {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns this relay's distance from the neighbour at `side` along x, m, negative in the wrong order. The distance
-    /// is computed from the last reported x of both. NaN if one of them is unknown, or the neighbour's has expired.
+    /// Returns the distance along x from this relay to the neighbour at `side`, m. It is negative if the two are in the
+    /// wrong order. The distance is computed from the last reported x of both relays. NaN if one of these is unknown,
+    /// or if that of the neighbour has expired.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -124,13 +124,13 @@ impl Association {
     }
 
     /// Returns true if the last reported x of this relay and of the neighbour are in the wrong order. They must differ
-    /// by more than the sum of the errors of both reports.
+    /// by more than the position errors of both relays, 2 `hover_m`.
     pub(super) fn is_on_wrong_side(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
     /// Returns true if the last reported x of this relay and of the neighbour are in the right order. They must differ
-    /// by at least the sum of the errors of both reports.
+    /// by at least the position errors of both relays, 2 `hover_m`.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -159,8 +159,7 @@ impl Association {
     }
 
     /// Returns a new association (session) with the same neighbour, after this relay has left `self`. If the neighbour
-    /// has sent its number for the association `self`, it still relies on that association. The new association then
-    /// includes a leave notice.
+    /// has sent a number for `self`, it still relies on `self`. The new association then includes a leave notice.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own_number: self.own_number,
@@ -185,9 +184,8 @@ impl Association {
         }
     }
 
-    /// Returns true if the message `fence` belongs to an association (session) that was left. This relay or its
-    /// neighbour has left it. If the neighbour still uses an association that this relay has left, the leave notice is
-    /// repeated.
+    /// Returns true if `fence` belongs to an association (session) that this relay or its neighbour left. If the
+    /// neighbour still uses an association that this relay has left, the leave notice is repeated.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -232,8 +230,8 @@ impl Association {
         known
     }
 
-    /// Returns a message to the neighbour about the fence (limit of x between the two relays). The caller fills in the
-    /// fence's number, its x, and the distance to keep before it, which are 0 in the result.
+    /// Returns a message to the neighbour about the fence (plane x = constant between the two relays). The caller fills
+    /// in the fence's number, its x, and the upstream relay's distance from it. These are 0 in the result.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own_number,
@@ -251,8 +249,8 @@ impl Association {
     }
 
     /// Records if the neighbour's message `fence` requests an open chain. In an open chain all relays are at least the
-    /// minimum separation apart along x. A reply is due if the message shows that the neighbour has not received this
-    /// relay's own last request or its withdrawal.
+    /// minimum separation apart along x. A reply is due if the message shows that the neighbour has missed this relay's
+    /// own last request for an open chain, or the withdrawal of this request.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.open_requested = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
@@ -265,9 +263,9 @@ impl Association {
         self.open_sent = opens;
     }
 
-    /// Records if the neighbour's message `fence` requests a halt. A message without a request ends an earlier one, but
-    /// only if its position is valid (`is_placed`). A rebooted neighbour has no valid position at first, and does not
-    /// know its earlier request.
+    /// Records if the neighbour's message `fence` requests a halt. A message without a halt request ends an earlier
+    /// halt request, but only if its position is valid (`is_placed`). A rebooted neighbour has no valid position at
+    /// first, and does not know its earlier request.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -291,15 +289,15 @@ impl Association {
         self.halt_sent
     }
 
-    /// Counts one reminder, sent every second. The neighbour's halt request and its position expire after 15
-    /// reminders without a repetition.
+    /// Counts one reminder; reminders are due every second. The neighbour's halt request and its last x expire after 15
+    /// reminders without a new message.
     pub(super) const fn count_reminder(&mut self) {
         self.halt_reminders_left = self.halt_reminders_left.saturating_sub(1);
         self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
-    /// Returns the pending message of a relay that does not fly to setpoints or has just started. `None` if there is
-    /// none.
+    /// Returns the pending message of this relay, if it does not fly to setpoints or has just started. `None` if no
+    /// message is pending.
     ///
     /// The message contains the relay's reported position, and a halt request if one must be forwarded. The message is
     /// valid without an association (session).
@@ -315,8 +313,8 @@ impl Association {
         })
     }
 
-    /// Counts a message of another association (session). Returns true once [`MAX_FOREIGN_MESSAGES`] such messages were
-    /// received in a row: the neighbour must have restarted.
+    /// Counts a message that does not belong to this association (session). Returns true once [`MAX_FOREIGN_MESSAGES`]
+    /// such messages were received in a row: the neighbour must have restarted.
     pub(super) const fn count_foreign(&mut self) -> bool {
         self.foreign_messages = self.foreign_messages.saturating_add(1);
         self.foreign_messages >= MAX_FOREIGN_MESSAGES
@@ -327,16 +325,16 @@ impl Association {
 /// does not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Nearest lost node on this side, and the limit of this relay's x due to all lost nodes, m. The limit is NaN if no
-    /// node is lost.
+    /// Nearest lost node on this side; no meaning if no node is lost.
     lost: u16,
+    /// Limit of this relay's x due to all lost nodes on this side, m. NaN if no node is lost.
     limit_m: f32,
-    /// Nearest lost node whose x was known, and the x, m, that its drone is not nearer than. The x is NaN without such a
-    /// node.
+    /// Nearest lost node whose last x had a known limit; no meaning without such a node.
     known: u16,
+    /// Limit of the x of the node `known`, m: its drone is there or farther away. NaN without such a node.
     known_m: f32,
-    /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if it is no closer now.
-    /// Before this x, possibly only lateral offset and altitude keep this relay apart from the lost relay.
+    /// x at which this relay is at least the minimum separation away from a lost relay, m. NaN if this relay already
+    /// is. Until it is there, possibly only lateral offset and altitude keep the two relays apart.
     near_m: f32,
     /// True while a lost relay may be on the wrong side of this relay along x.
     disordered: bool,
@@ -389,8 +387,8 @@ impl KeepOut {
         };
     }
 
-    /// Records that the drone of the lost relay `node` at `side` is no nearer than the x `x_m`. If there already is such
-    /// a lost relay, the nearer node is kept.
+    /// Records that the drone of the lost relay `node` at `side` is at the x `x_m` or farther away. If there already is
+    /// such a record, that of the nearer node is kept.
     pub(super) const fn record_lost_x(&mut self, side: Side, node: u16, x_m: f32) {
         if self.known_m.is_nan() || Self::is_nearer(side, node, self.known) {
             (self.known, self.known_m) = (node, x_m);
@@ -399,8 +397,8 @@ impl KeepOut {
 
     /// Returns true if the new neighbour `node` at `x_m` is on the wrong side of a lost drone along x.
     ///
-    /// The number of `node` is between that of this relay and that of the lost drone, so its x has to be between them,
-    /// too, up to the errors of the reports. The new neighbour knows nothing of the lost drone.
+    /// The number of `node` is between the numbers of this relay and of the lost drone. So its x has to be between the
+    /// x of these two, except for position errors. The new neighbour knows nothing of the lost drone.
     pub(super) fn bars(&self, side: Side, node: u16, x_m: f32, config: &GuardConfig) -> bool {
         let beyond_m = match side {
             Side::Upstream => self.known_m - x_m,
@@ -410,7 +408,7 @@ impl KeepOut {
             && beyond_m > 2.0 * config.hover_m + config.rounding()
     }
 
-    /// Removes obstacles on `side` after a message from `node`: this node, and nodes farther away. Those are no
+    /// Removes obstacles on `side` after a message from `node`: the node itself, and all nodes beyond it. These are no
     /// obstacles, because `node` is between them and this relay. An obstacle is a lost relay, or a drone that does not
     /// fly to setpoints.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
@@ -452,7 +450,8 @@ impl KeepOut {
 
     /// Returns the reason why a neighbour without an association (session) stops this relay.
     ///
-    /// It is `Lost` beside a lost drone, which the neighbour may have to pass, otherwise `Unheard`.
+    /// The reason is `Lost` if there is a lost drone on this side, which the neighbour may have to pass. Otherwise it
+    /// is `Unheard`.
     pub(super) const fn unpaired_reason(&self) -> HoldReason {
         if self.has_lost() {
             HoldReason::Lost
@@ -470,15 +469,18 @@ impl KeepOut {
         }
     }
 
-    /// Returns true if a drone not flying to setpoints blocks the path from setpoint to agreed position.
+    /// Returns true if a drone not flying to setpoints blocks this relay's way to its agreed position. The way begins
+    /// at the relay's setpoint.
     pub(super) fn blocks(&self, own: &Own) -> bool {
         let ways = own.setpoint.zip(own.target);
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
-    /// Returns the last permitted position on the path `from` to `to`, near a drone without setpoints. Along x the path
-    /// ends at the separation from the drone, or at `from` if that is closer, unless lateral offset and altitude
-    /// separate the two. Within the separation along x, a move across x must lead away from the drone.
+    /// Returns the end of the path `from` to `to` near a neighbour's drone that does not fly to setpoints.
+    ///
+    /// Along x the path ends at the minimum separation from the drone, or at `from` if `from` is closer. It does not
+    /// end there if lateral offset and altitude keep the separation. Closer than the separation along x, lateral offset
+    /// and altitude change only if this leads away from the drone.
     pub(super) fn path_end(
         &self,
         from: Placement,
@@ -507,24 +509,24 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Sets the limit due to lost relays on this side to `x_m`, the x of this relay's first setpoint.
+    /// Sets the limit of this relay's x due to lost relays to `x_m`, the x of this relay's first setpoint.
     ///
-    /// No effect without a lost relay. The lost relays may hover anywhere beyond `x_m`. At x = `near_m` this relay has
-    /// the separation from all of them.
+    /// No effect without a lost relay. The lost relays may hover anywhere beyond `x_m`. At x = `near_m` this relay is
+    /// the minimum separation away from all of them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if self.has_lost() {
             (self.limit_m, self.near_m) = (x_m, near_m);
         }
     }
 
-    /// Records that the most recently lost relay may be closer than the minimum separation. The record ends when this
+    /// Records that the most recently lost relay may be closer than the minimum separation. This state ends when this
     /// relay is at x = `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
     /// Returns the x, m, at which this relay is the minimum separation away from the last lost relay. NaN if this relay
-    /// is already so far away.
+    /// already is at least the minimum separation away.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
@@ -535,7 +537,7 @@ impl KeepOut {
     }
 
     /// Ends the state [`is_near`](Self::is_near) once this relay is far enough from the lost relay. This is so at x =
-    /// `near_m`. `is_beyond` returns true if this relay is at or past the x in its argument.
+    /// `near_m`. `is_beyond` returns true if this relay is at the x in its argument, or farther from the lost relay.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             self.limit_m = match side {
@@ -561,7 +563,7 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Adds an obstacle for the relays at `side`, none of which has ever sent a message to this relay. These relays may
+    /// Adds an obstacle: the relays at `side`, if none of them has ever sent a message to this relay. These relays may
     /// hover anywhere beyond the plane x = `limit_m`. This relay keeps at least `separation_m` away from that plane,
     /// until one of the relays sends a message.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
@@ -594,7 +596,7 @@ pub struct Fence {
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, this is the lateral offset and altitude of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the upstream relay wants to keep before the fence, m, 0 to 1e5. While it is below the
+    /// Distance along x that the upstream relay wants to keep from its newest fence, m, 0 to 1e5. While it is below the
     /// minimum separation, the downstream relay must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
@@ -602,26 +604,26 @@ pub struct Fence {
 }
 
 impl Fence {
-    /// Flag: the sender has arrived at its lateral offset and altitude.
+    /// Flag: the sender has arrived at the lateral offset and altitude of its setpoint.
     pub const ARRIVED: u8 = 1;
-    /// Flag of the downstream relay: it agrees to the distance `apart_m` of the newest fence.
+    /// Flag of the downstream relay: it agrees to the distance `apart_m` from the newest fence.
     pub const AGREES: u8 = 2;
-    /// Flag: request to open the chain, so that all relays are at least the separation apart along x. The sender, or a
+    /// Flag: request for an open chain: all relays at least the minimum separation apart along x. The sender, or a
     /// relay farther away, needs the open chain to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
     /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies the flag `REQUESTS_OPENING`
     /// of the last message received from the destination to this flag.
     pub const OPENING_RECEIVED: u8 = 8;
     /// Flag: the sender has left this association (session). The sender's drone does not fly to its setpoints, or did
-    /// not do so for a time. The fence number is not valid, and the position only together with
-    /// [`UNPLACED`](Self::UNPLACED).
+    /// not do so for a time. The fence number is not valid. The position is valid only if the flag
+    /// [`UNPLACED`](Self::UNPLACED) is set, too.
     pub const LEFT: u8 = 16;
     /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay farther away,
     /// is on the wrong side of a neighbour along x, or does not know its order with a neighbour. The request is
     /// repeated every second, and is valid in any association (session).
     pub const HALTS: u8 = 32;
-    /// Flag: the position in this message shows the order of the two relays along x, but permits no move. The relay
-    /// downstream sets the flag while its order with its own downstream neighbour is not confirmed. With
+    /// Flag: the position in this message shows the order of the two relays along x. It permits the receiver no move.
+    /// The relay downstream sets the flag while its order with its own downstream neighbour is not confirmed. With
     /// [`LEFT`](Self::LEFT): the sender does not fly to setpoints, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
@@ -659,7 +661,8 @@ impl Fence {
 pub enum HoldReason {
     /// Messages have not confirmed yet that this relay and the neighbour are in order along x.
     Unheard,
-    /// The neighbour is on the wrong side of this relay along x, or too close to know. Neither relay moves.
+    /// The neighbour is on the wrong side of this relay along x, or so close that the order is unknown. Neither relay
+    /// moves.
     Order,
     /// The agreed positions of this relay and the neighbour are too close. Neither their x nor their lateral offsets
     /// and altitudes separate them.

@@ -63,7 +63,7 @@ pub struct GuardConfig {
 impl GuardConfig {
     /// Returns the configuration with a mission's separation, distance and altitude band.
     ///
-    /// The band is extended to the profile's altitude.
+    /// If the altitude of `profile` is outside of the mission's altitude band, the band is extended to it.
     ///
     /// If relays leave the line Tx-Rx while they have no quorum ([`Settings::without_quorum`](crate::Settings)), the
     /// geofence must be [enlarged](Self::with_room_for) for their positions, because it limits all setpoints.
@@ -141,8 +141,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the position nearest to `place` that is no farther outside of the geofence than `before`. This applies
-    /// to each coordinate. If `before` is inside the geofence, so is the result.
+    /// Returns the position nearest to `place` that is no farther outside of the geofence than `before`. Each
+    /// coordinate is limited separately. If `before` is inside the geofence, so is the result.
     pub(super) fn clamp_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.geofence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
@@ -185,8 +185,8 @@ impl GuardConfig {
     }
 
     /// Returns the smallest difference in x that keeps two relays the minimum separation apart, m. `one` and `other`
-    /// are the lateral offset and altitude of each relay. The result is 0 if these differences alone keep the relays
-    /// apart.
+    /// are the lateral offset and altitude of each relay. The result is 0 if lateral offset and altitude alone keep the
+    /// relays apart.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))

@@ -27,7 +27,7 @@ const END_SPEED_M_S: f32 = 0.2;
 /// the target by 1.25 d m/s.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// Maximum speed of the moving target, as a fraction of the drone's speed limit. The difference is a margin, because a
+/// Maximum speed of the moving target, as a fraction of the drone's speed limit. A margin of 4 % is left, because a
 /// drone at times flies faster than its target.
 const CARROT_PART: f32 = 0.96;
 
@@ -41,15 +41,15 @@ const TOP_PER_S: f32 = 0.5;
 /// while the drone is far behind it.
 const LEAST_PART: f32 = 0.1;
 
-/// Factor on the acceleration limit, for velocity across the direction to a new setpoint.
+/// Factor on the acceleration limit, for velocity that does not lead toward a new setpoint.
 ///
-/// When the setpoint changes, the moving target still has its old velocity. Its component toward the new setpoint
-/// stays. All other velocity is reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`].
-/// An instant turn of the target would make the drone overshoot it and come back.
+/// When the setpoint changes, the moving target still has its old velocity. The part of this velocity toward the new
+/// setpoint stays. The rest is reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`]. An
+/// instant turn of the target would make the drone overshoot it and come back.
 const TURN_PART: f32 = 2.0;
 
-/// Remaining distance of the moving target to the setpoint at which a stop counts as complete, m. The drone, which is
-/// behind the target, then has up to 0.5 m left.
+/// Distance of the moving target to the setpoint that may remain after [`Pace::stopping_time`], m. The drone is behind
+/// the target, and then moves no farther than 0.5 m.
 const SETTLED_M: f32 = 0.25;
 
 /// Assumed time from a new setpoint until the drone reacts, ms. This time includes 200 ms for the transmission to the
@@ -186,8 +186,8 @@ impl Carrot {
         self.is_standing
     }
 
-    /// Returns the moving target's position at the time `ago` before its last step. The target's present velocity is
-    /// assumed for the whole time `ago`.
+    /// Returns the position that the moving target had a time `ago` before its last step. The target's present velocity
+    /// is assumed for the whole time `ago`.
     fn place_before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -199,7 +199,7 @@ impl Carrot {
     }
 
     /// Returns the position at which the moving target stops if it decelerates from now on. The position is on the way
-    /// to `setpoint`, at most `setpoint` itself.
+    /// to `setpoint`, and never beyond `setpoint`.
     pub(super) fn stop(&self, setpoint: Placement, pace: Pace) -> Placement {
         let to = self.way_to(setpoint);
         let left = length(to);
@@ -220,7 +220,8 @@ impl Carrot {
         way(self.place, setpoint)
     }
 
-    /// Moves the target toward `setpoint` until `now`. `drone` is the drone's position and its age; `None` if unknown.
+    /// Moves the target toward `setpoint`, for the time from its last step to `now`. `drone` is the drone's last
+    /// position, with the age of this position; `None` if unknown.
     pub(super) fn advance(
         &mut self,
         now: Instant,
@@ -317,7 +318,7 @@ const AGAIN: Duration = Duration::from_millis(1_000);
 /// Number of consecutive reports of a different target after which the sent target counts as refused. A different
 /// target is one other than the sent target. An ArduCopter reports its target twice a second.
 const REFUSED_AFTER: u8 = 6;
-/// Time after the last report of a different target at which a refusal ends, in units of 2^20 µs.
+/// Time without a report of a target other than the sent one, after which a refusal ends. Unit: 2^20 µs.
 const UNKNOWN_AFTER_S: u32 = 10;
 /// Minimum time for which targets must have been sent before the autopilot can count as refusing them.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
@@ -332,7 +333,7 @@ const NEAR_S: f32 = 1.0;
 /// Maximum number of transmissions of a standing target to an ArduCopter that never reports a target.
 const UNCONFIRMED: u8 = 10;
 
-/// Target that is sent to the autopilot, with its schedule and the autopilot's confirmation of it.
+/// Target that is sent to the autopilot, the schedule of its transmissions, and its confirmation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Target {
     pub(super) carrot: Carrot,
@@ -554,8 +555,8 @@ mod tests {
         }
     }
 
-    /// Checks that the moving target stops without a jerk when the setpoint is withdrawn, at any time. The target
-    /// decelerates by less than 0.23 m/s in 0.1 s, and never stops beyond the setpoint.
+    /// Checks that the moving target stops without a jerk, at whatever time the setpoint is withdrawn. The target
+    /// decelerates by less than 0.23 m/s in 0.1 s, and never moves beyond the position at which it must stop.
     #[test]
     fn a_withdrawn_carrot_stops_gently_anywhere() {
         let to = Placement::on_line(60.0, 20.0);
@@ -668,8 +669,8 @@ mod tests {
         );
     }
 
-    /// Checks that the moving target turns smoothly if a new setpoint lies in a different direction. The velocity in
-    /// the old direction ends within 3 s.
+    /// Checks that the moving target turns smoothly if a new setpoint is not in its direction of motion. The velocity
+    /// in the old direction ends within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

@@ -45,7 +45,8 @@ pub(super) struct Clearance {
     accepted: Option<(Address, RelayNumbers)>,
     /// Unsent answer to a command: addressee and `MAV_RESULT`; `None` if there is none.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays have landed, for the relay. `None` if no side is pending.
+    /// Side whose lost relays have landed according to the operator. The relay has not been informed yet. `None` if
+    /// there is no such side.
     cleared: Option<Side>,
 }
 
@@ -57,7 +58,8 @@ impl Clearance {
         }
     }
 
-    /// Adds a relay that `event` reports as lost or as leaving, or removes a relay that is received again.
+    /// Adds to the lost relays a node that `event` reports as lost or as permitted to leave. Removes from them a node
+    /// that is received again.
     pub(super) fn handle_event(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { side, node } | Event::MayLeaveTold { side, node } => {
@@ -120,7 +122,7 @@ impl Clearance {
 }
 
 impl LostSide {
-    /// Returns true if `named` contains all lost relays of this side, at least one, and no other relay.
+    /// Returns true if `named` contains exactly the lost relays of this side. False if no relay is lost.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);

@@ -48,10 +48,10 @@ const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time from one loss of the position to the next for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from an ArduCopter's mode change to its report of the geofence breach that caused it.
+/// Maximum time from an ArduCopter's mode change after a geofence breach to its report of the breach.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Minimum time for which a reason must have kept the relay from control before the reason is reported.
+/// Minimum time for which the reason why the relay cannot control the drone must be unchanged. It is then reported.
 const SETTLED: Duration = Duration::from_millis(1_000);
 /// Minimum time between two reports why the relay cannot control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
@@ -96,8 +96,8 @@ pub struct Autopilot {
     located_at: Option<Instant>,
     /// Time for which positions must arrive regularly before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Loss of control over the drone that has not been reported yet, and the time of its report. `None` if there is
-    /// none.
+    /// Loss of control over the drone that has not been reported yet, and the time by which it is reported. `None` if
+    /// there is none.
     release: Option<(Release, Instant)>,
     /// Reason why the pilot cannot give the relay control of the drone, and the time of its last change. `None` if the
     /// pilot can give control.
@@ -119,7 +119,7 @@ pub struct Autopilot {
     position: Option<Position>,
     off_line_detector: OffLineDetector,
     clearance: Clearance,
-    /// Newest noise measurement of a SiK radio, and the drone's position.
+    /// Newest noise measurement of a SiK radio, and the drone's position at that time.
     noise: RadioNoise,
     events: Events,
     sequence: u8,
@@ -392,7 +392,7 @@ impl Autopilot {
         self.report.queue_text(text)
     }
 
-    /// Processes an event of the relay, and sends the operator a text about events that matter in flight.
+    /// Processes an event of the relay. The operator is sent a text about events such as a lost neighbour.
     ///
     /// After a new view (list of relays), the text is sent once the relays have agreed on their positions. It is sent
     /// only if the relay controls the drone and the guard does not hold the drone back.
@@ -508,7 +508,7 @@ impl Autopilot {
             .is_some_and(|at| now.since(at) >= self.recovery);
     }
 
-    /// Returns the cause of a loss of control at this moment, and the autopilot's mode.
+    /// Returns the cause of a loss of control that happens now, and the present mode of the autopilot.
     fn release(&self) -> Release {
         let vehicle = &self.vehicle;
         let mode = vehicle.mode().unwrap_or(FlightMode::Other);
@@ -605,7 +605,7 @@ impl Autopilot {
         Some(self.trust.sign(now, frame))
     }
 
-    /// Returns the next frame to the autopilot without a signature; `None` if none is pending.
+    /// Returns the next frame to the autopilot; the frame is not signed yet. `None` if none is pending.
     fn next_frame(&mut self, now: Instant) -> Option<FrameBytes> {
         if let Some((to, result)) = self.clearance.take_answer() {
             let command = CLEAR_LOST;
@@ -749,7 +749,7 @@ impl Autopilot {
         OffLine::new(at, &self.axis)
     }
 
-    /// Returns the newest noise measured in the air by a SiK radio, and the drone's position.
+    /// Returns the newest noise measured in the air by a SiK radio, and the drone's position at that time.
     ///
     /// The noise is from RADIO_STATUS. The caller passes both to `Relay::handle_sample`. `None` if there is no new
     /// measurement since the last call, or without the feature `sensing`.

@@ -27,9 +27,9 @@ const URGENT: u32 = 5_000;
 /// Maximum number of different text lines sent to the operator within [`SPACING`].
 const RECENT: usize = 16;
 
-/// Maximum number of queued lines written by this link.
+/// Maximum number of queued text lines that this autopilot link has written for the operator.
 const LINES: usize = 6;
-/// Maximum number of queued texts written by the firmware.
+/// Maximum number of queued texts that the firmware has written for the operator.
 const TEXTS: usize = 3;
 
 /// Interval at which the chain's SIR and the setpoint's coordinates are sent to the operator.

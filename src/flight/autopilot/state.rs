@@ -96,7 +96,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`; `None` for an unsupported one.
+    /// Returns the kind of an autopilot with the given `MAV_AUTOPILOT` and `MAV_TYPE`. `None` if it is not supported.
     pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
         match autopilot {
             12 => Some(Self::Px4),
@@ -127,7 +127,7 @@ pub enum FlightMode {
 }
 
 impl FlightMode {
-    /// Returns the flight mode with the number `custom_mode` of this kind of autopilot.
+    /// Returns the flight mode that has the number `custom_mode` on an autopilot of the kind `kind`.
     pub(super) const fn of(kind: Kind, custom_mode: u32) -> Self {
         match kind {
             Kind::Px4 => match (custom_mode >> 16 & 0xFF, custom_mode >> 24) {

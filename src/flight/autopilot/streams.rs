@@ -34,8 +34,8 @@ const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// True if the drone cannot be controlled without the message. All other messages (target, geofence, battery, home)
-    /// are not sent by every autopilot.
+    /// True if the drone cannot be controlled without the message. Messages with false (target, geofence, battery,
+    /// home) are optional: some autopilots do not send them.
     is_vital: bool,
 }
 
@@ -178,7 +178,8 @@ impl Streams {
 
     /// Returns the next message to request, and its interval in µs; `None` if no request is due.
     ///
-    /// Battery messages are requested only if `counts` is true: the endurance is then computed from them.
+    /// Battery messages are requested only if `counts` is true: the link then computes the remaining time of flight
+    /// from them.
     pub(super) fn take(&mut self, now: Instant, kind: Kind, counts: bool) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.outstanding {
             if now.since(at) < ANSWER {

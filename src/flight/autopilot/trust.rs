@@ -125,7 +125,7 @@ impl Trust {
         self.refused
     }
 
-    /// Returns the frame with a signature, if the link has a key.
+    /// Returns `frame`: signed if the link has a key, otherwise unchanged.
     pub(super) fn sign(&mut self, now: Instant, frame: FrameBytes) -> FrameBytes {
         match &mut self.signing {
             Some(signing) => signing.sign(now, frame),

@@ -78,7 +78,7 @@ pub(super) enum VehicleUpdate {
     OffLine(Geodetic),
     /// Target that the autopilot reports: latitude and longitude, 1e-7 degrees.
     Target(i32, i32),
-    /// Answer to a request for a message, with its `MAV_RESULT`.
+    /// Value of `MAV_RESULT` in the autopilot's answer to a request for a message.
     RequestResult(u8),
 }
 
@@ -416,7 +416,7 @@ impl Vehicle {
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the next time at which the state changes without a new message; `None` if there is none.
+    /// Returns the next time at which this state changes without a new message; `None` if there is none.
     ///
     /// At that time a received value becomes too old to be used, or a TIMESYNC request is due.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
@@ -449,16 +449,16 @@ pub(super) struct Battery {
     /// [`UNSET`](Self::UNSET) are used, and no battery messages are requested.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
-    /// New remaining time of flight, s; NaN if the battery states none. `None` on the ground, and if there is no new
-    /// value since the last read.
+    /// New remaining time of flight, s; NaN if the battery's message contains no valid value. `None` on the ground, and
+    /// from a read of the value until the next battery message.
     newest: Option<f32>,
 }
 
 impl Battery {
     const UNSET: [f32; 3] = [f32::NAN, 5.0, 1.5];
 
-    /// Returns true if a message about `battery` is used. BATTERY_STATUS is used for battery 0. SYS_STATUS (`battery`
-    /// is `None`) is used only if no BATTERY_STATUS of battery 0 came in the last 10 s.
+    /// Returns true if a message about the battery with the number `battery` is used. BATTERY_STATUS is used for
+    /// battery 0. SYS_STATUS (`battery` is `None`) is used only if no BATTERY_STATUS of battery 0 came for 10 s.
     fn is_first(&mut self, now: Instant, battery: Option<u8>) -> bool {
         if battery == Some(0) {
             self.detailed_at = Some(now);
@@ -623,7 +623,7 @@ const RESTARTED_US: i64 = 2_000_000;
 /// that the minimum covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in a half of the time window before the next half begins.
+/// Minimum number of messages in a half of the time window (see [`HALF`]) before the next half begins.
 ///
 /// With fewer messages, a half could contain only the late messages after a pause of the link. The delay of these late
 /// messages would then count as normal.
@@ -830,7 +830,7 @@ mod clock_tests {
         Instant::from_millis(ms)
     }
 
-    /// Simulates messages over a link with delays. Returns the age of each message by [`RemoteClock`], ms.
+    /// Simulates messages over a link with delays. Returns the age of each message that [`RemoteClock`] computes, ms.
     ///
     /// The autopilot sends a message every 200 ms for 80 s. `clock_ms` and `delay` return the autopilot's clock and the
     /// link's delay at a time; all are in ms.

@@ -110,8 +110,8 @@ pub mod id {
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// Maximum length of the extension fields that a later MAVLink dialect may add to a message, bytes. Bytes that claim to
-/// be a longer message are skipped as noise.
+/// Maximum length of the extension fields that a later MAVLink dialect may add to a message, bytes. Received bytes that
+/// look like a longer message are skipped as noise.
 const ADDED: u8 = 24;
 
 impl Known {
@@ -131,8 +131,8 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
 
 /// Messages that the parser knows: those used by this crate, and those that can contain MAVLink frames.
 ///
-/// The parser skips a message that can contain frames as a whole. So a frame inside its payload does not count as
-/// received.
+/// A message that can contain frames is skipped together with its payload. So a frame inside the payload does not count
+/// as received.
 const TABLE: [Known; 31] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::SYS_STATUS, 124, 31),

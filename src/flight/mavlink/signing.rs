@@ -86,7 +86,7 @@ pub enum Flaw {
 pub struct Signing {
     key: [u8; 32],
     link: u8,
-    /// Timestamp at the time `at` of this link's clock, in units of 10 µs.
+    /// Timestamp that belongs to the time `at` of this link's clock, in units of 10 µs.
     stamp: u64,
     at: Instant,
     /// Timestamp of the last sent frame, in units of 10 µs.
@@ -102,7 +102,8 @@ impl core::fmt::Debug for Signing {
 }
 
 impl Signing {
-    /// Creates signing with the key `key` and the link id `link`. `stamp` is the timestamp of the time `now`.
+    /// Creates the signing state with the key `key` and the link id `link`. `stamp` is the timestamp that belongs to
+    /// the time `now`.
     pub const fn new(key: [u8; 32], link: u8, stamp: Stamp, now: Instant) -> Self {
         const NOBODY: Sender = Sender {
             from: Address {
@@ -122,7 +123,8 @@ impl Signing {
         }
     }
 
-    /// Advances this link's timestamp to `now`. A longer time than about an hour takes several calls.
+    /// Advances this link's timestamp toward `now`, by about an hour at most. After a longer time several calls are
+    /// needed.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;
