@@ -22,8 +22,8 @@ pub(crate) const FIRST_PATIENCE: Duration = PATIENCE;
 
 pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
-/// Telemetry message to be forwarded away from its sender, with the side of the destination. The destination is the
-/// neighbour on the side opposite to the sender. `None` if there is no message.
+/// Telemetry message that this relay still has to forward, with the side of its destination. The destination is the
+/// neighbour on the side opposite to the sender. Empty if there is no message.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reporting([Option<(Side, Message)>; AUTH as usize]);
 

@@ -39,7 +39,7 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{Upload, UploadError, check_line};
 
-/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0: no nonce.
+/// Random number (nonce) in this relay's hellos, 0 for none, with the times of its first and last use.
 ///
 /// A mission offer to this relay must repeat the nonce. So an old recording of an offer is recognised.
 #[derive(Clone, Copy, Debug)]
@@ -467,9 +467,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the exceeded limit.
     ///
-    /// The distance from Tx to Rx is not limited if the mission has its own Tx and Rx positions (`sited`). If this
-    /// relay's fixed altitude equals an altitude limit of the geofence, the limit of the loaded mission counts in its
-    /// place. So all relays decide alike.
+    /// The distance from Tx to Rx is not limited if the mission has its own Tx and Rx positions (`sited`). If an
+    /// altitude limit of the geofence equals this relay's fixed altitude, it is replaced by the altitude limit of the
+    /// mission loaded before flight. So all relays decide alike.
     fn encloses(
         &self,
         member: &Member,

@@ -474,9 +474,9 @@ fn late_messages_grant_nothing() {
     );
 }
 
-/// Checks that an old position report lets no neighbour move into the space that a relay will leave.
+/// Checks that an old position report of a relay does not let its neighbour come closer.
 ///
-/// The report is older than the setpoint, or too early to show its effect.
+/// The report is older than the setpoint, or too early to show the setpoint's effect.
 #[test]
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);

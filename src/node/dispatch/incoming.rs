@@ -83,8 +83,7 @@ impl Node {
         true
     }
 
-    /// Returns true if `message` belongs to the current mission and view. The view is compared only for messages that
-    /// depend on it.
+    /// Returns true if `message` belongs to the current mission and, if it depends on a view, to that view.
     ///
     /// A message of a different mission or view is counted and answered by a hello. If it belongs to an agreement on
     /// positions, this relay also requests a new view.

@@ -70,7 +70,8 @@ pub(crate) struct Node {
     pub(super) no_quorum_timer: NoQuorumTimer,
     /// Received claim that must be sent back to its sender as an echo; `None` if there is none.
     pub(super) echo: Option<Echo>,
-    /// Side to which this relay sends its next claim to its node number.
+    /// Side of the neighbour that receives this relay's next claim. Claims let two nodes with one node number detect
+    /// each other.
     pub(super) claim_side: Side,
     /// Votes on views that the firmware has confirmed as stored.
     persisted: ViewRecord,
@@ -85,7 +86,8 @@ impl Node {
     /// Creates a relay with valid `identity` and `settings`. The relay does nothing until [`begin`](Self::begin) is
     /// called.
     ///
-    /// The value has only plain numbers, so that the compiler can write it in place, without a copy on the stack.
+    /// All fields of the new value are plain numbers, so that the compiler can write it in place, without a copy on the
+    /// stack.
     pub(crate) fn new(
         mission: &Mission,
         identity: Identity,
@@ -359,7 +361,8 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` would leave out relays that will soon be linked.
+    /// Returns true if a view proposal from `side` comes too early: some relays there are not linked yet. The view
+    /// would leave out these relays, although their links will soon exist.
     ///
     /// This is assumed if the proposal has visited fewer relays than the previous proposal, and its sender has only
     /// just become the neighbour.

@@ -30,8 +30,8 @@ use crate::time::{Duration, Instant};
 /// After a silence as long as the maximum lease, it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor on the longest recent run of unanswered heartbeat requests, for the loss of a neighbour. A neighbour counts
-/// as lost only after at least three times as many unanswered requests.
+/// Factor that determines how many unanswered heartbeat requests show the loss of a neighbour. At least three times as
+/// many are needed as in the longest recent run of unanswered requests.
 const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour.
@@ -138,11 +138,12 @@ impl Liveness {
         }
     }
 
-    /// Restarts the record, because a different node is the neighbour now. The longest run of unanswered requests is
-    /// kept, because that number describes the channel.
+    /// Restarts the record, because a different node is the neighbour now. The longest run of unanswered heartbeat
+    /// requests is kept, because it measures the losses of the channel.
     ///
-    /// The unanswered requests to the previous node count as a run, unless `was_down` is true: then they measure an
-    /// outage of the link. If `flaps` is true (the link flaps slowly), all runs are dropped.
+    /// The requests that the previous node has not answered are such a run, too, unless `was_down` is true: then they
+    /// show an outage of the link. If `flaps` is true (the link flaps slowly), the longest run is reset to its initial
+    /// value.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS

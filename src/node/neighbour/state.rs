@@ -80,8 +80,8 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side of the relay that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
-    /// Neighbours toward this relay that the four nearest nodes on one side of the relay have selected. 0 stands for no
-    /// neighbour. The entry of the nearest node is the first.
+    /// Neighbours that the four nearest nodes on this side have selected toward this relay; 0 for none. The entry of
+    /// the nearest node is the first.
     pub(super) selection: [u16; CANDIDATES as usize],
     /// Time of the last frame on this side of the relay from a node that is not the neighbour. `None` if there was
     /// none.
@@ -508,9 +508,10 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, not counting the nearest.
+    /// Returns the number of nodes between this relay and the candidate, without the nearest of them.
     ///
-    /// The nearest node is lost. Each of the others could still answer, and so delays the selection of the candidate.
+    /// The nearest of them is lost. Each of the others could still answer, and so delays the selection of the
+    /// candidate.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
