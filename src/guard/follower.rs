@@ -94,8 +94,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association (session) with the upstream neighbour, and schedules a notice to it. This relay's drone
-    /// no longer flies to setpoints, so no limit of x applies to it.
+    /// Leaves the association (session), and schedules a notice of this to the upstream neighbour. This relay's drone
+    /// no longer flies to setpoints, so no limit of x applies to this relay.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -104,8 +104,8 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays are kept as obstacles. Drones that
-    /// do not fly to setpoints are not kept.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays on this side remain obstacles.
+    /// Drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -195,7 +195,8 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Returns true if the upstream side permits this relay to change its lateral offset and altitude.
+    /// Returns true if the upstream neighbour permits this relay to change its lateral offset and altitude. A lost
+    /// relay that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
@@ -216,7 +217,7 @@ impl FenceFollower {
         self.has_fence() && !self.clear
     }
 
-    /// Returns true if the agreed positions of this relay and its upstream neighbour are too close along x.
+    /// Returns true if this relay's agreed x is less than the separation beyond its upstream neighbour's.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }

@@ -550,7 +550,7 @@ impl Guard {
         hovers || !self.flown || self.own.reported.is_none()
     }
 
-    /// Returns the reason on the side `side` that keeps this relay from its agreed position.
+    /// Returns the reason at `side` why this relay does not fly on to its agreed position.
     ///
     /// `None` without such a reason, or without an agreed position. Shortly after a new agreement the reason may still
     /// refer to the previous positions. While the drone does not fly to setpoints, only [`HoldReason::Order`] is

@@ -128,7 +128,7 @@ impl ReachableInterval {
     }
 }
 
-/// Maximum time between two position reports for which the drone counts as hovering.
+/// Maximum time between two position reports of a drone that counts as hovering.
 const HOVER_REPORTS: Duration = Duration::from_millis(2_500);
 
 /// Number of seconds without a change of the setpoint after which a neighbour counts as the obstacle.
@@ -311,7 +311,8 @@ impl Own {
             && (is.x_m - to_be.x_m).abs() <= most
     }
 
-    /// Returns true if two lateral offsets and altitudes agree, within a hovering relay's position error.
+    /// Returns true if two pairs of lateral offset and altitude agree. They agree if they differ by at most a hovering
+    /// relay's position error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most

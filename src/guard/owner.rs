@@ -91,8 +91,8 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association (session) with the downstream neighbour, and schedules a notice to it. This relay's drone
-    /// no longer flies to setpoints, so no limit of x applies to it.
+    /// Leaves the association (session), and schedules a notice of this to the downstream neighbour. This relay's drone
+    /// no longer flies to setpoints, so no limit of x applies to this relay.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -101,8 +101,8 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays are kept as obstacles. Drones that
-    /// do not fly to setpoints are not kept.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays on this side remain obstacles.
+    /// Drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -285,7 +285,8 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Returns true if the downstream side permits this relay to change its lateral offset and altitude.
+    /// Returns true if the downstream neighbour permits this relay to change lateral offset and altitude. A lost relay
+    /// that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
@@ -300,7 +301,7 @@ impl FenceOwner {
         self.has_reply() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and of its downstream neighbour are too close.
+    /// Returns true if the downstream neighbour's agreed x is less than the separation beyond this relay's.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         // Before its first position the neighbour's agreed x is unknown.
         let place = self.neighbour_place();

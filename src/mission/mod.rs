@@ -323,8 +323,8 @@ pub struct Mission {
     /// sender's power, divided by the squared distance.
     ///
     /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
-    /// field it is E[1/I] at Rx, divided by eta. eta is the path-loss factor drone to ground, `mu_nlos` that from the
-    /// interferer to Rx. With noise, the interference at Rx includes the noise.
+    /// field it is the mean inverse interference E[1/I] at Rx, divided by eta. eta is the path-loss factor drone to
+    /// ground, `mu_nlos` that from the interferer to Rx. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,
     /// Receiver noise divided by the interferer's power received at 1 m, 1/m^2. This is nu = N eta / `p_MSI`, with the
     /// noise N, the path-loss factor eta and the interferer's power `p_MSI`. It is 0 without noise, and in an

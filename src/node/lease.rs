@@ -99,7 +99,7 @@ pub(crate) struct Lease {
     departures: [Departures; DEPARTURES as usize],
 }
 
-/// Requests of this relay. At the leader also the state of departures from the chain.
+/// Requests of this relay to the leader. At the leader also the state of departures from the chain.
 #[derive(Clone, Copy, Debug)]
 struct Departures {
     requests: Requests,
@@ -365,7 +365,7 @@ impl Lease {
     }
 
     /// Extends this relay's lease after the completed renewal `pulse`, in which all members took part. The lease ends
-    /// when the duration in `pulse` has passed since this relay forwarded it.
+    /// when the duration in `pulse` has passed since this relay forwarded the renewal.
     ///
     /// `next` is the lease duration in the next renewal, in tenths of a second. The first lease in a view is not
     /// granted if `next` is more than twice the duration in `pulse`. It would expire before the next renewal completes.

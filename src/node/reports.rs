@@ -138,7 +138,7 @@ struct Stored {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Rank {
     /// The entry was sent with its details (additional state of the relay). The details are not sent again, even if a
-    /// copy of the entry with details arrives by a different way.
+    /// copy of the entry with details arrives through a different relay.
     Detailed,
     /// The entry was sent without details.
     Sent,
@@ -264,8 +264,8 @@ impl Reporting {
         }
     }
 
-    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if an entry belongs
-    /// to a relay from which no report can come through `from`.
+    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if the report has
+    /// the state of a relay whose reports cannot come through node `from`.
     pub(crate) fn handle(
         &mut self,
         now: Instant,

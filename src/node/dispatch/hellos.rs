@@ -226,7 +226,7 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records whether node `from` receives this relay (`heard`). After several reports in a row of failed reception,
+    /// Records whether node `from` receives this relay (`heard`). After several consecutive reports that it does not,
     /// the node is reported to the firmware.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);

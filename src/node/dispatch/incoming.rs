@@ -251,7 +251,7 @@ impl Node {
     }
 
     /// Handles a valid handshake of node `from` at `side`. The handshake does not prove that the node receives this
-    /// relay, so the node counts as not receiving it.
+    /// relay, so the node is recorded as one that does not.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {

@@ -389,10 +389,10 @@ pub(super) struct Telemetry {
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time without a quorum until relays drop their links for the first time, in units of `dead_after`.
+/// Time without a quorum after which relays drop their links first, in units of `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time between later drops of the links, while there is still no quorum, in units of `dead_after`.
+/// Time from one drop of the links to the next while there is no quorum, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
 /// Timer after which a relay without a quorum drops its links and searches for other neighbours.

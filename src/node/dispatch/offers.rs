@@ -176,8 +176,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles a neighbour's report that the mission `refused` is refused. Either the neighbour or a relay beyond it
-    /// has refused it.
+    /// Handles a neighbour's report that the mission `refused` is refused. The neighbour itself, or a relay beyond the
+    /// neighbour, has refused this mission.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {

@@ -206,7 +206,7 @@ mod tests {
         node.on_telemetry(now, Side::Downstream, from, &Message::Report(report));
     }
 
-    /// Passes a message of another mission of node `from` to the node.
+    /// Passes to the relay `node` a message of a different mission, which node `from` has sent.
     fn foreign(node: &mut Node, now: Instant, from: u16) {
         let mission = node.member.digest ^ 1;
         let watch = Message::Watch { number: 1, mission };

@@ -230,8 +230,8 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the losses of all links on this side of the relay to those of the link lost last. These links were lost
-    /// together, because all of them cross the same gap in the chain.
+    /// Raises the number of losses of each link on this side of the relay to that of the link lost last. These links
+    /// were lost together, because all of them cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

@@ -36,8 +36,8 @@ const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour.
 ///
-/// It is the round trip through `all` relays, but short enough for sixteen requests between `probe_after` and
-/// `dead_after`.
+/// It is the round trip through `all` relays, but short enough for sixteen requests between a silence of `probe_after`
+/// and a silence of `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
@@ -45,12 +45,12 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
 /// Returns the interval between heartbeat requests before the first agreement on positions.
 ///
 /// The interval is longer than [`tick`], because many relays then search on one channel. It is short enough for three
-/// requests between `probe_after` and `dead_after`.
+/// requests between a silence of `probe_after` and a silence of `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
 
-/// Returns the time from the first heartbeat request to the loss of a neighbour, in µs. It is `dead_after` -
+/// Returns the time from the first heartbeat request to the loss of a silent neighbour, in µs. It is `dead_after` -
 /// `probe_after`.
 const fn waiting(settings: &Settings) -> u64 {
     let dead = settings.dead_after.as_micros();
@@ -98,7 +98,7 @@ pub(crate) struct Liveness {
     lost: bool,
     /// True if the neighbour has been received since the start, or since it was lost.
     was_received: bool,
-    /// Number of the last heartbeat request to the neighbour, 0 if none was sent.
+    /// Sequence number of the last heartbeat request to the neighbour; 0 if none was sent.
     request_number: u16,
     /// Times of the last heartbeat requests, latest first.
     request_times: [Instant; REMEMBERED_REQUESTS],

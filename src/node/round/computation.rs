@@ -383,8 +383,8 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if no other algorithm follows this search.
         last: bool,
-        /// True for a search at the configured altitudes, because those of the joint method failed. No target was
-        /// feasible at the joint method's altitudes.
+        /// True for the search at the configured altitudes. It follows if no target was feasible at the joint method's
+        /// altitudes.
         given: bool,
     },
     /// Algorithm 2, in which the relays move one after the other.
