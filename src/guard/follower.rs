@@ -19,7 +19,7 @@ pub(super) struct FenceFollower {
     pub(super) keep_out: KeepOut,
     /// Sequence number of the newest fence (limit of x) from the upstream neighbour; 0 for none yet.
     number: u16,
-    /// x of the upstream neighbour's newest fence, m. This relay's x stays at or above it.
+    /// Newest lower limit of this relay's x (fence), which the upstream neighbour has set, m.
     fence_m: f32,
     /// Distance along x that the upstream neighbour requests to keep from its fence (limit of x), m. Infinite before
     /// its first request.
@@ -33,7 +33,8 @@ pub(super) struct FenceFollower {
     across: CrossSection,
     /// True once this relay's x is known to have reached a fence (lower limit) of the upstream neighbour.
     clear: bool,
-    /// True once the upstream neighbour has been told that this relay's x has reached the newest fence.
+    /// True once the upstream neighbour has been told that this relay has reached the newest fence. The fence is the
+    /// lower limit of this relay's x.
     owner_informed: bool,
 }
 
@@ -178,7 +179,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the upstream neighbour's agreed position; `None` before its first fence message.
+    /// Returns the upstream neighbour's agreed position; `None` before the neighbour's first fence message. A fence
+    /// message contains a limit of x and the agreed position.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         (self.number != 0).then(|| self.across.at(self.target_m))
     }

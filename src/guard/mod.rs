@@ -417,7 +417,8 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if fences or reported positions show the relay between its neighbours along x.
+    /// Returns true if this relay is seen between its neighbours along x. Fences (limits of x) or reported positions
+    /// show this.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);

@@ -16,7 +16,8 @@ pub(super) struct FenceOwner {
     pub(super) keep_out: KeepOut,
     /// Sequence number of the newest fence (limit of x) sent to the downstream neighbour; 0 for none.
     number: u16,
-    /// x of the newest fence sent, m; infinite if there is none. The downstream neighbour's x stays at or above it.
+    /// Newest lower limit of the downstream neighbour's x (fence), which this relay has set, m. Infinite before the
+    /// first.
     fence_m: f32,
     /// Distance along x that this relay requests to keep from its fence (limit of x), m. Infinite before its first
     /// request.
@@ -32,9 +33,9 @@ pub(super) struct FenceOwner {
     /// there.
     across: CrossSection,
     arrived: bool,
-    /// True if the downstream neighbour has received the newest fence.
+    /// True if the downstream neighbour has received the newest fence, the lower limit of its x.
     is_acknowledged: bool,
-    /// True once the downstream neighbour has reported that its x has reached a fence.
+    /// True once the downstream neighbour has reported that it has reached a fence (lower limit of its x).
     clear: bool,
 }
 
@@ -210,7 +211,8 @@ impl FenceOwner {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
 
-    /// Returns the downstream neighbour's agreed position; `None` before its first fence message.
+    /// Returns the downstream neighbour's agreed position; `None` before its first fence message. A fence message
+    /// contains a limit of x and the agreed position.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         self.follower_low_m
             .is_finite()
@@ -392,8 +394,9 @@ impl FenceOwner {
 
     /// Returns the pending fence message to the downstream neighbour; `None` if none is pending.
     ///
-    /// If `moves` is true, the message may contain a new fence with the next number. Otherwise the message repeats the
-    /// last fence. Only this function gives a fence its number, so that every fence with a number is sent.
+    /// If `moves` is true, the message may contain a new fence (lower limit of the neighbour's x) with the next number.
+    /// Otherwise the message repeats the last fence. Only this function gives a fence its number, so that every fence
+    /// with a number is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

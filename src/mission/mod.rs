@@ -282,7 +282,7 @@ impl Band {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Profile {
-    /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
+    /// Altitude above the ground plane at which the relay flies, m: 0.1 to 1e5.
     pub altitude_m: f32,
     /// Transmit power of the relay, W: 1e-6 to 1e6.
     pub power_w: f32,

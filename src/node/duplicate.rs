@@ -67,8 +67,8 @@ const AFTER_START: Duration = Duration::from_millis(2_000);
 /// `dead_after`. Claims let two nodes with one node number detect each other.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims that this relay sends in answer to a claim of a duplicate. The interval between them is
-/// [`least_interval`].
+/// Number of claims that this relay sends in answer to a claim of a node with the same number. The interval between
+/// them is [`least_interval`].
 const DEFENCES: u8 = 32;
 
 /// Number of claims that this relay sends after a frame of a second node with its node number. The frame contains no

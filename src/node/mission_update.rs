@@ -52,7 +52,7 @@ struct Asked {
 /// Mission offers to the neighbour on one side, and replies to the ground station on that side.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Nonce in the neighbour's last hello, repeated by the next offer to it. 0 without a hello.
+    /// Nonce in the neighbour's last hello, repeated by the next offer to the neighbour. 0 before the first hello.
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` without a hello.
     heard: Option<Instant>,
@@ -175,8 +175,8 @@ impl MissionUpdate {
         Mission::try_new(*upload.config()).ok()
     }
 
-    /// Returns the nonce for the next hello, which an offer must repeat. 0 if uploads are not accepted. The nonce
-    /// changes every `dead_after`.
+    /// Returns the nonce for the next hello, which a mission offer must repeat. 0 if this relay accepts no uploads. The
+    /// nonce changes every `dead_after`.
     pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
         let Some(uploads) = uploads.filter(|_| accepts_uploads(member)) else {
@@ -195,7 +195,7 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay.
+    /// Returns true if the nonce `answer` of a mission offer was in a recent hello of this relay.
     ///
     /// Recent means within the last two periods of `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {

@@ -181,7 +181,7 @@ struct Watched {
     own_from: Instant,
     /// Number of entries that this relay has sent about itself, wrapping.
     count: u8,
-    /// True if entries of other relays have arrived since the last report.
+    /// True if entries (states of other relays) have arrived since this relay's last report.
     is_fed: bool,
     /// True if a change of this relay's state begins an alarm that has not been reported.
     is_alarmed: bool,

@@ -45,7 +45,8 @@ impl Row {
         }
     }
 
-    /// Passes the next message of relay `k` (0 to 2) to its neighbour, and returns it. `None` if none is pending.
+    /// Delivers the next fence message of relay `k` (0 to 2) to its neighbour, and returns the message. `None` if none
+    /// is pending.
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;

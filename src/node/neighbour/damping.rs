@@ -37,7 +37,7 @@ const MAX_FORGIVEN: u8 = 2;
 /// Minimum time between two losses of a slowly flapping link, in units of `dead_after`.
 const SLOW_INTERVAL: u32 = 10;
 
-/// Time without a loss after which earlier losses of a link no longer count, in units of `dead_after`.
+/// Time without a loss of a link after which older losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
 /// Reception of one node without long gaps: its distance, and the times of its first and last frame.
@@ -106,7 +106,7 @@ impl Link {
     }
 
     /// Returns true during the hold-down: the link was lost repeatedly and must not be used. The hold-down ends once
-    /// the node has been received without gaps for long enough.
+    /// the node has been received for long enough without a long silence.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(MAX_FORGIVEN + 1) else {
             return false;
@@ -139,7 +139,8 @@ impl Link {
 /// Losses of the links to the four nearest nodes on one side of the relay, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that will be selected once it has been received without gaps for long enough. `None` if there is none.
+    /// Node that will be selected once it has been received for long enough without a long silence. `None` if there is
+    /// none.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }

@@ -85,7 +85,7 @@ impl Refusals {
 
     /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
     ///
-    /// Only nodes fewer than `end` relays away count.
+    /// Nodes `end` or more relays away are left out.
     pub(super) fn nearest(mut self, now: Instant, end: u16) -> [u16; 2] {
         self.age(now);
         let nodes = self.now | self.before;

@@ -214,8 +214,8 @@ impl Neighbour {
         back
     }
 
-    /// Returns true if this relay and its neighbour have selected each other. The neighbour's last report shows its
-    /// selection.
+    /// Returns true if this relay and its neighbour have selected each other. The selection of the neighbour is that in
+    /// its last report.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }
@@ -641,8 +641,8 @@ const NOT_RECEIVED: u8 = 8;
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Returns true if this relay and the node `distance` relays away receive each other. A flapping link that is held
-    /// down does not count.
+    /// Returns true if this relay and the node `distance` relays away receive each other. A link that was lost
+    /// repeatedly, and is therefore not used for a while (held down), does not count.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held_down_nodes(now, settings);
         let is_in = |nodes: u8| mask(distance) & nodes != 0;
@@ -731,7 +731,7 @@ impl Neighbour {
 
     /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
     ///
-    /// A refusal counts for one to two minutes. Only nodes fewer than `end` relays away count.
+    /// A wrong mission or key is remembered for one to two minutes. Nodes `end` or more relays away are left out.
     pub(crate) fn refused(&self, now: Instant, end: u16) -> [u16; 2] {
         self.refusals.nearest(now, end)
     }
