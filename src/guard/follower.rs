@@ -7,8 +7,8 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Limit for the comparison of 16-bit fence numbers, which wrap around. A fence is newer if its number minus the last
-/// one, modulo 2^16, is above 0 and below this limit.
+/// Half of the range of 16-bit fence numbers, which wrap around. A received fence (limit of x between two relays) is
+/// newer than the stored one if its number minus the stored number, modulo 2^16, is above 0 and below this value.
 const AHEAD: u16 = 0x8000;
 
 /// State of the fence toward Tx: the plane x = constant that is a lower limit of this relay's x. The upstream neighbour
@@ -17,11 +17,12 @@ const AHEAD: u16 = 0x8000;
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence from the upstream neighbour; 0 if there is none yet.
+    /// Sequence number of the newest fence (limit of x) from the upstream neighbour; 0 for none yet.
     number: u16,
-    /// x of the upstream neighbour's newest fence, m. This relay's x stays at or above it.
+    /// Newest lower limit of this relay's x (fence), which the upstream neighbour has set, m.
     fence_m: f32,
-    /// Distance along x that the upstream neighbour wants to keep before its fence, m. Infinite until it requests one.
+    /// Distance along x that the upstream neighbour requests to keep from its fence (limit of x), m. Infinite before
+    /// its first request.
     requested_m: f32,
     /// Distance along x to the upstream neighbour that this relay has agreed to, m. Infinity, also the initial value,
     /// stands for the minimum separation.
@@ -32,7 +33,8 @@ pub(super) struct FenceFollower {
     across: CrossSection,
     /// True once this relay's x is known to have reached a fence (lower limit) of the upstream neighbour.
     clear: bool,
-    /// True once the upstream neighbour has been told that this relay's x has reached the newest fence.
+    /// True once the upstream neighbour has been told that this relay has reached the newest fence. The fence is the
+    /// lower limit of this relay's x.
     owner_informed: bool,
 }
 
@@ -66,9 +68,9 @@ impl FenceFollower {
         self.association.node = node;
     }
 
-    /// Starts a new association (session) with the upstream neighbour. `keep_out` keeps the limit that the previous
-    /// neighbour set to this relay's x. If that neighbour has set no fence, the limit is the x of this relay's
-    /// setpoint.
+    /// Starts a new association (session) with the upstream neighbour. The field `keep_out` keeps the lower limit of
+    /// this relay's x from the old association. If the neighbour had set no fence (limit of x) in it, the limit is the
+    /// x of this relay's setpoint.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -93,8 +95,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association (session) with the upstream neighbour, and schedules a notice to it. This relay's drone
-    /// no longer flies to setpoints, so no limit of x applies to it.
+    /// Leaves the association (session), and schedules a notice of this to the upstream neighbour. This relay's drone
+    /// no longer flies to setpoints, so no limit of x applies to this relay.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -103,8 +105,8 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays are kept as obstacles. Drones that
-    /// do not fly to setpoints are not kept.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays on this side remain obstacles.
+    /// Drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -177,7 +179,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the upstream neighbour's agreed position; `None` before its first fence message.
+    /// Returns the upstream neighbour's agreed position; `None` before the neighbour's first fence message. A fence
+    /// message contains a limit of x and the agreed position.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         (self.number != 0).then(|| self.across.at(self.target_m))
     }
@@ -194,28 +197,29 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m())
     }
 
-    /// Returns true if the upstream side permits this relay to change its lateral offset and altitude.
+    /// Returns true if the upstream neighbour permits this relay to change its lateral offset and altitude. A lost
+    /// relay that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the upstream neighbour requests a distance along x below the minimum separation. This relay must
-    /// then not change its lateral offset or altitude.
+    /// Returns true if the upstream neighbour requests to come closer along x than the minimum separation. Meanwhile
+    /// this relay must not change its lateral offset or altitude.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true while this relay and its upstream neighbour may still be as close as they started.
+    /// Returns true while this relay may be as close to its upstream neighbour as it was at its start.
     ///
-    /// They may be closer than the minimum separation. The neighbour has announced a fence (limit of x), but this relay
-    /// is not known to have been beyond it.
+    /// The neighbour has announced a fence (lower limit of this relay's x), but no position report has shown this relay
+    /// at or beyond a fence yet. So the two may be closer along x than the minimum separation.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
 
-    /// Returns true if the agreed positions of this relay and its upstream neighbour are too close along x.
+    /// Returns true if this relay's agreed x is less than the separation beyond its upstream neighbour's.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
@@ -231,8 +235,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the distance along x that is guaranteed to the upstream neighbour, m. Infinity stands for the minimum
-    /// separation. The result is 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
+    /// Returns the distance along x that this relay and its upstream neighbour surely keep, m. Infinity stands for the
+    /// minimum separation. The result is 0 while a lost relay may be closer than the separation, and until this relay
+    /// has reached its first fence (lower limit of its x).
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
@@ -244,8 +249,9 @@ impl FenceFollower {
     /// Returns true if this relay is known to be at a larger x than its upstream neighbour. Also true if the neighbour
     /// does not fly to setpoints, or if the chain ends here.
     ///
-    /// A fence (limit of x) of the neighbour shows the order: the neighbour announces a fence only after it has found
-    /// this relay at a larger x than its own. False while a lost relay may be on the wrong side of this relay.
+    /// The proof is a fence (lower limit of x) from the neighbour: the neighbour announces one only after it has found
+    /// this relay at a larger x than its own. False while a lost relay on the upstream side may be at a larger x than
+    /// this relay.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.has_fence())
@@ -264,9 +270,9 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Records that this relay has reached the newest fence (limit of x), if its reachable x show this. If `low_m`
-    /// shows this, too, a message to the upstream neighbour is due. `low_m` is the lowest x of this relay and of the
-    /// relays downstream, m.
+    /// Checks if this relay has reached the newest fence (lower limit of its x), and records it. It has if its lowest
+    /// possible x is not below the fence. A message to the upstream neighbour is due if `low_m` is not below the fence
+    /// either. `low_m` is the lowest x of this relay and of the relays downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -274,10 +280,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest x that the relays upstream may still take after this relay's start, m.
+    /// Returns the highest x that the relays upstream of this relay can still take, m.
     ///
-    /// Until this relay is beyond the first fence (limit of x), the relays upstream may be closer than the separation.
-    /// After that they are all at a smaller x than this relay, and the result is negative infinity.
+    /// The relays upstream may be closer than the separation until this relay has reached its first fence (lower limit
+    /// of its x). After that they are all at a smaller x than this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.has_fence() && !self.clear {
             self.fence_m - self.requested_m.min(own.config.separation_m)
@@ -286,9 +292,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the upstream neighbour; `None` if none is pending. Its x is `low_m`, m. If
-    /// `placed` is false, the order of this relay and its downstream neighbour is not confirmed. A message is then only
-    /// sent to request a halt, with this relay's own lowest x.
+    /// Returns the pending message to the upstream neighbour; `None` if none is pending. The x in the message is
+    /// `low_m`, m. If `placed` is false, the order of this relay and its downstream neighbour is not confirmed. Then a
+    /// message is only sent to request a halt, and the x in it is this relay's own lowest x.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

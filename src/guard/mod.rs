@@ -130,7 +130,7 @@ pub struct Guard {
     /// The reason is a neighbour on the wrong side of this relay along x, or an order along x that has been unknown for
     /// several seconds (reminders) in a row.
     disorder: bool,
-    /// Number of seconds (reminders) in a row in which the order along x was unknown.
+    /// Number of successive reminders (calls of `remind`, one per second) with an unknown order along x.
     unordered: u8,
     reminders: u8,
     refused: u32,
@@ -244,8 +244,8 @@ impl Guard {
         self.own.config.geofence = fence;
     }
 
-    /// Records that relay `node` has the order to leave the chain; 0 for none. The fences (limits of x) next to that
-    /// relay then leave to it only the room that it needs to hold its position.
+    /// Records that relay `node` is ordered to leave the chain; 0 for none. The fences (limits of x) on both sides of
+    /// that relay then move as near to it as its position permits, so that its neighbours can close up to it.
     pub const fn set_leaver(&mut self, node: u16) {
         self.own.leaver = node;
     }
@@ -273,8 +273,8 @@ impl Guard {
     /// Sets the neighbour at `side`; `None` at the end of the chain. No effect if `neighbour` is already set.
     ///
     /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget) is called. A
-    /// message of the previous neighbour, or of a node between the two relays, also ends this once the sender is the
-    /// new neighbour.
+    /// message of the new neighbour also ends this, if the new neighbour is the previous one again, or is a node
+    /// between this relay and the previous one.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -290,8 +290,8 @@ impl Guard {
 
     /// Removes the obstacles of lost relays at `side`. The lost relays have landed or were removed.
     ///
-    /// `others` is true if the chain has more relays on this side. If no message of these has been received, this relay
-    /// keeps clear of everything beyond its present x until it receives one of them.
+    /// `others` is true if the chain has other relays on this side. If this relay has not received any of these yet, it
+    /// does not go beyond its present x toward `side` until it receives one.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         let (is_heard, limit_m, keep_out) = match side {
@@ -372,7 +372,7 @@ impl Guard {
         self.own.setpoint
     }
 
-    /// Removes the restrictions near a lost neighbour once this relay is the minimum separation away.
+    /// Ends the restrictions due to a close lost neighbour once it is the minimum separation away along x.
     fn clear_near(&mut self) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         self.follower
@@ -417,7 +417,8 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if fences or reported positions show the relay between its neighbours along x.
+    /// Returns true if this relay is seen between its neighbours along x. Fences (limits of x) or reported positions
+    /// show this.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);
@@ -426,7 +427,7 @@ impl Guard {
     }
 
     /// Halts this relay while its order along x is unknown (`is_ordered` is false), or on a halt request. Such a
-    /// request comes from another relay, or from this relay if a neighbour is on its wrong side.
+    /// request comes from another relay, or from this relay itself if the order is wrong or stays unknown.
     fn halt(&mut self, is_ordered: bool, now: Instant) {
         self.disorder &= !is_ordered && !self.is_seen_in_order();
         self.disorder |= self.is_out_of_order();
@@ -531,14 +532,14 @@ impl Guard {
         }
     }
 
-    /// Returns true if the downstream neighbour has answered the newest fence (limit of x). Also true if it cannot
-    /// answer: before its first message, and if it does not fly to setpoints.
+    /// Returns true unless the downstream neighbour still has to answer the newest fence (limit of x). It has to answer
+    /// none before its first message, and while it does not fly to setpoints.
     pub fn is_answered(&self) -> bool {
         self.owner.is_answered()
     }
 
-    /// Returns true if the drone hovers, so that the first setpoint can be set at a known position. Also true if there
-    /// is a setpoint, or if the drone does not fly to setpoints.
+    /// Returns true if the drone hovers at a known position, which can become the first setpoint. Also true if there
+    /// already is a setpoint, or if the drone does not fly to setpoints.
     pub fn may_begin(&self, now: Instant) -> bool {
         !self.flown || self.own.setpoint.is_some() || self.own.hovers(now)
     }
@@ -550,7 +551,7 @@ impl Guard {
         hovers || !self.flown || self.own.reported.is_none()
     }
 
-    /// Returns the reason on the side `side` that keeps this relay from its agreed position.
+    /// Returns the reason at `side` why this relay does not fly on to its agreed position.
     ///
     /// `None` without such a reason, or without an agreed position. Shortly after a new agreement the reason may still
     /// refer to the previous positions. While the drone does not fly to setpoints, only [`HoldReason::Order`] is
@@ -596,7 +597,7 @@ impl Guard {
         }
     }
 
-    /// Returns the reason why the setpoint has not moved toward `side` for five seconds, if it should. The reason is
+    /// Returns a reason if the setpoint should have moved toward `side`, but has not for five seconds. The reason is
     /// `NotFlown` if the neighbour does not fly to setpoints, otherwise `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;

@@ -43,8 +43,8 @@ pub(super) struct ReachableInterval {
     /// Interval of the x of all setpoints since `recent_since`, m.
     recent_span: Span,
     recent_since: Instant,
-    /// Interval of the x of earlier setpoints, m. The relay was possibly still on its way to one of them at the last
-    /// position report.
+    /// Interval of the x of older setpoints, m. The relay was possibly still flying to one of them at the last position
+    /// report.
     earlier_span: Span,
     reported_at: Instant,
     /// True once a position report is recent enough to show that the drone follows its first setpoint. Also true if the
@@ -128,10 +128,10 @@ impl ReachableInterval {
     }
 }
 
-/// Maximum time between two position reports for which the drone counts as hovering.
+/// Maximum time between two position reports of a drone that counts as hovering.
 const HOVER_REPORTS: Duration = Duration::from_millis(2_500);
 
-/// Number of seconds without a move of the setpoint after which the relay counts as held up.
+/// Number of seconds without a change of the setpoint after which a neighbour counts as the obstacle.
 const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
@@ -158,9 +158,9 @@ pub(super) struct Own {
     pub(super) sent_place: Placement,
     /// Number of reminders (seconds) since the last change of the setpoint.
     reminders: u8,
-    /// Last setpoint at which this relay has arrived, or its first setpoint. A relay that halts on its way stops no
-    /// farther outside of the geofence than this position. Before the first setpoint: the position at which the drone
-    /// hovers.
+    /// Last setpoint at which this relay has arrived, or its first setpoint. Before the first setpoint it is the
+    /// position at which the drone hovers. A relay that halts outside of the geofence stops where it is, but at most as
+    /// far outside as this position.
     last_arrival: Placement,
 }
 
@@ -197,8 +197,8 @@ impl Own {
 
     /// Returns the position from which the relay's next path starts: `setpoint` once it has arrived there.
     ///
-    /// Before its arrival, the x is the reported x, moved toward the x of `setpoint` by at most the error of the
-    /// report.
+    /// Before that, lateral offset and altitude are those of `setpoint`. The x is the last reported x, moved toward the
+    /// setpoint's x by at most the error of a position report.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -293,8 +293,9 @@ impl Own {
         reported_at >= changed_at + self.config.lag && now < reported_at + HOVER_REPORTS
     }
 
-    /// Handles a position report, measured at time `at`. It can show that the relay has arrived at its lateral offset
-    /// and altitude. For this, `at` must be at least the lag after the last change of these two.
+    /// Handles a position report, measured at time `at`. The report can show that the relay has arrived at the lateral
+    /// offset and altitude of its setpoint. It counts for this only if `at` is at least the lag after the last change
+    /// of either.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.arrived |= at >= self.cross_section_changed_at + self.config.lag
             && self.is_near(place.cross_section(), self.cross_section());
@@ -310,7 +311,8 @@ impl Own {
             && (is.x_m - to_be.x_m).abs() <= most
     }
 
-    /// Returns true if two lateral offsets and altitudes agree, within a hovering relay's position error.
+    /// Returns true if two pairs of lateral offset and altitude agree. They agree if they differ by at most a hovering
+    /// relay's position error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most

@@ -14,16 +14,18 @@ use crate::time::Jitter;
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence sent to the downstream neighbour; 0 if none was sent.
+    /// Sequence number of the newest fence (limit of x) sent to the downstream neighbour; 0 for none.
     number: u16,
-    /// x of the newest fence sent, m; infinite if there is none. The downstream neighbour's x stays at or above it.
+    /// Newest lower limit of the downstream neighbour's x (fence), which this relay has set, m. Infinite before the
+    /// first.
     fence_m: f32,
-    /// Distance along x that this relay wants to keep before its fence, m; infinite until it requests one.
+    /// Distance along x that this relay requests to keep from its fence (limit of x), m. Infinite before its first
+    /// request.
     requested_m: f32,
     /// Distance along x to keep now to the downstream neighbour, m. Infinity stands for the minimum separation. The
     /// value is the agreed distance, or a larger distance that this relay has requested after the agreement.
     agreed_m: f32,
-    /// Lowest x that the downstream neighbour may reach, m. Negative infinity before its first message.
+    /// Lowest x at which the downstream neighbour can be, m. Negative infinity before its first message.
     follower_low_m: f32,
     /// x that the chain has agreed on for the downstream neighbour, m.
     target_m: f32,
@@ -31,9 +33,9 @@ pub(super) struct FenceOwner {
     /// there.
     across: CrossSection,
     arrived: bool,
-    /// True if the downstream neighbour has received the newest fence.
+    /// True if the downstream neighbour has received the newest fence, the lower limit of its x.
     is_acknowledged: bool,
-    /// True once the downstream neighbour has reported that its x has reached a fence.
+    /// True once the downstream neighbour has reported that it has reached a fence (lower limit of its x).
     clear: bool,
 }
 
@@ -70,9 +72,9 @@ impl FenceOwner {
         self.association.node = node;
     }
 
-    /// Starts a new association (session) with the downstream neighbour. `keep_out` keeps the limit that the previous
-    /// neighbour set to this relay's x. If that neighbour is not known to be at a larger x, the limit is the x of this
-    /// relay's setpoint.
+    /// Starts a new association (session) with the downstream neighbour. The field `keep_out` keeps the upper limit of
+    /// this relay's x from the old association. If the neighbour was not known to be at a larger x, the limit is the x
+    /// of this relay's setpoint.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -90,8 +92,8 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association (session) with the downstream neighbour, and schedules a notice to it. This relay's drone
-    /// no longer flies to setpoints, so no limit of x applies to it.
+    /// Leaves the association (session), and schedules a notice of this to the downstream neighbour. This relay's drone
+    /// no longer flies to setpoints, so no limit of x applies to this relay.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -100,8 +102,8 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays are kept as obstacles. Drones that
-    /// do not fly to setpoints are not kept.
+    /// Starts a new association (session), because Tx or Rx has moved. Lost relays on this side remain obstacles.
+    /// Drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -189,9 +191,9 @@ impl FenceOwner {
         self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
-    /// Returns the distance along x that is guaranteed to the downstream neighbour, m. The result is 0 near a lost
-    /// relay, and until the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the upstream
-    /// neighbour, m.
+    /// Returns the distance along x that this relay and its downstream neighbour surely keep, m. The result is 0 while
+    /// a lost relay may be closer than the separation, and until the neighbour has reached its first fence (lower limit
+    /// of its x). `kept_m` is the distance that this relay and its upstream neighbour surely keep, m.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -209,7 +211,8 @@ impl FenceOwner {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
 
-    /// Returns the downstream neighbour's agreed position; `None` before its first fence message.
+    /// Returns the downstream neighbour's agreed position; `None` before its first fence message. A fence message
+    /// contains a limit of x and the agreed position.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         self.follower_low_m
             .is_finite()
@@ -268,7 +271,9 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the largest x at which this relay is `apart` metres before its downstream neighbour, m.
+    /// Returns the largest x at which this relay keeps `apart` metres from its downstream neighbour, m. While the order
+    /// of the two along x is not known, the result is the x of this relay's setpoint. A lost relay can lower the
+    /// result.
     #[inline(never)] // called from several places
     pub(super) fn max_x(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
@@ -282,22 +287,23 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m())
     }
 
-    /// Returns true if the downstream side permits this relay to change its lateral offset and altitude.
+    /// Returns true if the downstream neighbour permits this relay to change lateral offset and altitude. A lost relay
+    /// that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true while this relay and its downstream neighbour may still be as close as they started.
+    /// Returns true while this relay may be as close to its downstream neighbour as it was at its start.
     ///
-    /// They may be closer than the minimum separation. The neighbour has answered, but has not reported yet that it has
-    /// reached a fence (its lower limit of x).
+    /// The neighbour has answered, but has not reported yet that it has reached a fence (lower limit of its x). So the
+    /// two may be closer along x than the minimum separation.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and of its downstream neighbour are too close.
+    /// Returns true if the downstream neighbour's agreed x is less than the separation beyond this relay's.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         // Before its first position the neighbour's agreed x is unknown.
         let place = self.neighbour_place();
@@ -309,8 +315,8 @@ impl FenceOwner {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns true if the downstream neighbour has answered the newest fence (limit of x). Also true if it cannot
-    /// answer: before its first message, and if it does not fly to setpoints.
+    /// Returns true unless the downstream neighbour still has to answer the newest fence (limit of x). It has to answer
+    /// none before its first message, and while it does not fly to setpoints.
     pub(super) fn is_answered(&self) -> bool {
         let cannot = !self.has_reply() || self.association.has_no_flown_neighbour();
         cannot || self.is_acknowledged && !self.association.due
@@ -338,9 +344,9 @@ impl FenceOwner {
     /// Returns the next fence for the downstream neighbour: x (m), a distance (m), and true for a final x. `None` if
     /// the neighbour is not known to be at a larger x than this relay.
     ///
-    /// The neighbour's x stays at or above the fence, and this relay stays the distance before the fence. If x is not
-    /// final, the fence can come nearer once relays have moved. `kept_m` is the distance to the upstream neighbour, m.
-    /// `upstream_m` is the highest possible x of the relays upstream, m.
+    /// The neighbour's x stays at or above the fence, and this relay stays the distance below the fence. An x that is
+    /// not final can be lowered once this relay, or one upstream, has moved toward Tx. `kept_m` is the distance to the
+    /// upstream neighbour, m. `upstream_m` is the highest possible x of the relays upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -371,8 +377,9 @@ impl FenceOwner {
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
-    /// Schedules a message if the fence (limit of x) for the downstream neighbour must move. If the new x is final, the
-    /// message is due at once. Otherwise it is due after this relay's arrival, because the fence can then come nearer.
+    /// Schedules a message if the fence (limit of x) for the downstream neighbour needs another x. If the new x is
+    /// final, the message is due at once. Otherwise it is due once this relay has arrived at its setpoint's x, because
+    /// the fence can then be set to a lower x.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
         if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
             let stays = last || own.reachable.has_arrived();
@@ -387,8 +394,9 @@ impl FenceOwner {
 
     /// Returns the pending fence message to the downstream neighbour; `None` if none is pending.
     ///
-    /// If `moves` is true, the message may contain a new fence with the next number. Otherwise the message repeats the
-    /// last fence. Only this function gives a fence its number, so that every fence with a number is sent.
+    /// If `moves` is true, the message may contain a new fence (lower limit of the neighbour's x) with the next number.
+    /// Otherwise the message repeats the last fence. Only this function gives a fence its number, so that every fence
+    /// with a number is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

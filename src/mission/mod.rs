@@ -55,7 +55,7 @@ pub struct MissionConfig {
     /// m. 0 means receivers without noise, as in the paper. Above 0, every SIR is the SINR: signal over interference
     /// plus noise.
     pub noise_w: f32,
-    /// Ratio r of the SIR required for data from Rx to Tx to that for data from Tx to Rx: 0 to 1.
+    /// Ratio r: SIR required for data toward Tx, divided by that required for data toward Rx; 0 to 1.
     ///
     /// 0 means data from Tx to Rx only, as in the paper. Above 0, once the interference is known, the value of a hop is
     /// the lower of two: the SIR toward Rx, and the SIR toward Tx divided by r.
@@ -282,7 +282,7 @@ impl Band {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Profile {
-    /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
+    /// Altitude above the ground plane at which the relay flies, m: 0.1 to 1e5.
     pub altitude_m: f32,
     /// Transmit power of the relay, W: 1e-6 to 1e6.
     pub power_w: f32,
@@ -316,15 +316,15 @@ pub struct Mission {
     /// Gain of a drone-to-drone hop per watt of the sender's power; see [`Mission::relay_gain`].
     ///
     /// With one interferer of power `p_MSI` the gain is eta / (`mu_los` `p_MSI`), 1/W. In an interference field it is
-    /// `Upsilon_max` / `mu_los`, m^2/W, with the field's largest E[1/I]. eta is the path-loss factor drone to ground,
-    /// `mu_los` that drone to drone.
+    /// `Upsilon_max` / `mu_los`, m^2/W. `Upsilon_max` is the largest mean inverse interference, E[1/I], in the field.
+    /// eta is the path-loss factor drone to ground, `mu_los` that drone to drone.
     pub(super) relay_gain_per_w: f64,
     /// Gain of the last hop (to Rx) per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the
     /// sender's power, divided by the squared distance.
     ///
     /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
-    /// field it is E[1/I] at Rx, divided by eta. eta is the path-loss factor drone to ground, `mu_nlos` that from the
-    /// interferer to Rx. With noise, the interference at Rx includes the noise.
+    /// field it is the mean inverse interference E[1/I] at Rx, divided by eta. eta is the path-loss factor drone to
+    /// ground, `mu_nlos` that from the interferer to Rx. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,
     /// Receiver noise divided by the interferer's power received at 1 m, 1/m^2. This is nu = N eta / `p_MSI`, with the
     /// noise N, the path-loss factor eta and the interferer's power `p_MSI`. It is 0 without noise, and in an
@@ -657,8 +657,8 @@ impl Mission {
 impl Mission {
     /// Returns the gain A of the first hop (from Tx). The SIR of this hop is A times the inverse interference
     /// ([`crate::sir::quiet`]), divided by the squared length. With one interferer A is the power of Tx divided by the
-    /// power of the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` / eta times the field's largest
-    /// E[1/I] (`Upsilon_max`). eta is the path-loss factor drone to ground.
+    /// power of the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta. `Upsilon_max`
+    /// is the largest mean inverse interference, E[1/I], in the field, eta the path-loss factor drone to ground.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
@@ -726,7 +726,7 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, with room for the separation of later relays. Later relays
+    /// Returns the farthest x of relay `index`, m, at which later relays can still keep their separation. Later relays
     /// are those whose positions are computed after the position of relay `index`.
     ///
     /// Farthest means toward Rx, or toward Tx with an interference field. `across_squared` is the largest squared
@@ -736,8 +736,8 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, if later relays need no separation in x. Later relays are
-    /// those whose positions are computed after the position of relay `index`.
+    /// Returns the farthest x of relay `index`, m, if y and altitude alone keep the later relays apart. Later relays
+    /// are those whose positions are computed after the position of relay `index`.
     ///
     /// Farthest means toward Rx, or toward Tx with an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
@@ -752,12 +752,12 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, with room for the separation of the relays nearer to Rx.
+    /// Returns the largest x of relay `index`, m, at which the relays nearer to Rx can keep the separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index`, m, if the relays nearer to Rx need no separation in x.
+    /// Returns the largest x of relay `index`, m, if y and altitude keep the relays nearer to Rx apart.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }
@@ -786,8 +786,8 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of an outer hop (first or last) that makes that hop half as long as an inner one. In the best
-/// chain all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
+/// Factor on the gain of the first or the last hop that makes this hop half as long as an inner hop. In the best chain
+/// all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {

@@ -34,8 +34,8 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if each relay computes before it forwards the message. Such messages are twice as
-/// long, and each relay needs up to thirty steps of its computation.
+/// Factor on the wait for a reply if each relay computes before it forwards the message. The message is then twice as
+/// long as others, and each relay needs up to thirty steps of its computation.
 const SLOW: u32 = 4;
 
 /// Number of retransmissions after which the wait for the reply no longer doubles.
@@ -87,7 +87,7 @@ pub(crate) struct Path {
     pub(crate) slow: bool,
 }
 
-/// State of one relay for a message along the chain, and for the reply to it.
+/// State of one relay for a message that travels along the chain, and for the reply on its way back.
 #[derive(Clone, Debug)]
 pub(crate) struct Circulation {
     stage: Stage,

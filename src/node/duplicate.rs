@@ -67,12 +67,12 @@ const AFTER_START: Duration = Duration::from_millis(2_000);
 /// `dead_after`. Claims let two nodes with one node number detect each other.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims that this relay sends in answer to a claim of a duplicate. The interval between them is
-/// [`least_interval`].
+/// Number of claims that this relay sends in answer to a claim of a node with the same number. The interval between
+/// them is [`least_interval`].
 const DEFENCES: u8 = 32;
 
-/// Number of claims to its node number that this relay sends after a frame with this number. The frame comes from a
-/// second node, and contains no claim.
+/// Number of claims that this relay sends after a frame of a second node with its node number. The frame contains no
+/// claim.
 ///
 /// With signed frames: number of claims that this relay sends after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
@@ -104,7 +104,7 @@ pub(crate) struct IndexClaims {
     /// Last times at which two nodes with the same number were detected; `None` if never. Entry 0 is for this relay's
     /// number, entry 1 for a neighbour's.
     observed: [Option<Instant>; 2],
-    /// Time at which this relay last received an echo of its own frame; `None` if none has been received.
+    /// Time at which this relay last received one of its own frames back (echo); `None` if never.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while this relay is active.
     passive_until: Option<Instant>,
@@ -311,7 +311,7 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts periodic claims: on wired links without a key, or while `defences` is above 0.
+    /// Starts periodic claims if frames on wired links are not signed, or if `defences` is above 0.
     ///
     /// On a shared channel a relay receives the frames of a duplicate directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
@@ -418,7 +418,8 @@ mod tests {
         }
     }
 
-    /// Checks that a claim sent before this relay's last start is answered, and has no other effect.
+    /// Checks that a second node's claim from before this relay's last start is only answered. The claim repeats a
+    /// claim number that this relay no longer uses.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();

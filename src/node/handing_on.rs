@@ -18,7 +18,7 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Message;
 
-/// Telemetry message to be forwarded away from its sender, with the side of the destination. The destination is the
+/// Telemetry message that this relay still has to forward, with the side of its destination. The destination is the
 /// neighbour on the side opposite to the sender. `None` if there is no message.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reporting([Option<(Side, Message)>; AUTH as usize]);

@@ -73,8 +73,8 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Latest possible end of the other members' leases, as far as this relay has extended them. Each lease renewal
-    /// that this relay completes extends the leases of all members.
+    /// Latest possible end of other members' leases that this relay's completed renewals have extended. Each lease
+    /// renewal that this relay completes extends the leases of all members.
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which its agreed positions may be used.
     accepted: (ViewId, Instant),
@@ -99,7 +99,7 @@ pub(crate) struct Lease {
     departures: [Departures; DEPARTURES as usize],
 }
 
-/// Requests of this relay. At the leader also the state of departures from the chain.
+/// Requests of this relay to the leader. At the leader also the state of departures from the chain.
 #[derive(Clone, Copy, Debug)]
 struct Departures {
     requests: Requests,
@@ -108,11 +108,12 @@ struct Departures {
     /// Relay that requests to leave (0 for none), and the time of its first request. The request may be from an earlier
     /// view.
     leaver: (u16, Instant),
-    /// Time of the first agreement in this view, or since then the last time at which all were in place.
+    /// Last time at which all relays of the view were in place; at first the time of the first agreement.
     ///
     /// All are in place if two renewals in a row report it. The time is that of the leader.
     settled_at: Instant,
-    /// Time at which this view's first renewal turned at the last relay; `None` until it has completed.
+    /// Time at which the last relay answered this view's first lease renewal, as estimated by this relay. `None` until
+    /// this renewal has completed.
     turned_at: Option<Instant>,
 }
 
@@ -166,14 +167,14 @@ impl Lease {
 
     /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
-    /// A relay is ordered to leave once two consecutive renewals reported all relays in place. By then a relay
-    /// that left the chain earlier knows that all relays are in place. If there is a spare, the spare joins first. No
-    /// spare is called if the view already has more relays than before the request.
+    /// A relay is ordered to leave once two consecutive renewals have reported all relays in place. By then a relay
+    /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
+    /// it joins first, unless the view already has more relays than before the request to leave.
     ///
     /// A relay that does not arrive counts as in place after half of the maximum duration of a lease, counted from the
-    /// first agreement in this view, or from the last time that all were in place. A relay waits for
-    /// its order to leave at most this maximum duration, and at most its remaining endurance. So at least half of the
-    /// endurance at the first request remains.
+    /// first agreement in this view, or from the last time that all were in place. A relay waits for its order to leave
+    /// at most this maximum duration, and at most its remaining endurance. So at least half of the endurance at the
+    /// first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -294,7 +295,7 @@ impl Lease {
         }
     }
 
-    /// Returns the time at which this view's first renewal turned at the last relay; `None` if unknown.
+    /// Returns the time at which the last relay answered this view's first renewal; `None` if unknown.
     ///
     /// Each relay takes the middle between its forwarding of the renewal and its reception of the reply. So all relays
     /// obtain nearly the same time, without a common clock.
@@ -364,7 +365,7 @@ impl Lease {
     }
 
     /// Extends this relay's lease after the completed renewal `pulse`, in which all members took part. The lease ends
-    /// when the duration in `pulse` has passed since this relay forwarded it.
+    /// when the duration in `pulse` has passed since this relay forwarded the renewal.
     ///
     /// `next` is the lease duration in the next renewal, in tenths of a second. The first lease in a view is not
     /// granted if `next` is more than twice the duration in `pulse`. It would expire before the next renewal completes.

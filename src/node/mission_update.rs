@@ -39,7 +39,7 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{Upload, UploadError, check_line};
 
-/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0: no nonce.
+/// Random number (nonce) in this relay's hellos, 0 for none, with the times of its first and last use.
 ///
 /// A mission offer to this relay must repeat the nonce. So an old recording of an offer is recognised.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,7 @@ struct Asked {
 /// Mission offers to the neighbour on one side, and replies to the ground station on that side.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Nonce in the neighbour's last hello, repeated by the next offer to it. 0 without a hello.
+    /// Nonce in the neighbour's last hello, repeated by the next offer to the neighbour. 0 before the first hello.
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` without a hello.
     heard: Option<Instant>,
@@ -175,8 +175,8 @@ impl MissionUpdate {
         Mission::try_new(*upload.config()).ok()
     }
 
-    /// Returns the nonce for the next hello, which an offer must repeat. 0 if uploads are not accepted. The nonce
-    /// changes every `dead_after`.
+    /// Returns the nonce for the next hello, which a mission offer must repeat. 0 if this relay accepts no uploads. The
+    /// nonce changes every `dead_after`.
     pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
         let Some(uploads) = uploads.filter(|_| accepts_uploads(member)) else {
@@ -195,7 +195,7 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay.
+    /// Returns true if the nonce `answer` of a mission offer was in a recent hello of this relay.
     ///
     /// Recent means within the last two periods of `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
@@ -467,9 +467,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the exceeded limit.
     ///
-    /// The distance from Tx to Rx is not limited if the mission has its own Tx and Rx positions (`sited`). If this
-    /// relay's fixed altitude equals an altitude limit of the geofence, the limit of the loaded mission counts in its
-    /// place. So all relays decide alike.
+    /// The distance from Tx to Rx is not limited if the mission has its own Tx and Rx positions (`sited`). If an
+    /// altitude limit of the geofence equals this relay's fixed altitude, it is replaced by the altitude limit of the
+    /// mission loaded before flight. So all relays decide alike.
     fn encloses(
         &self,
         member: &Member,

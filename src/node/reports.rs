@@ -33,14 +33,16 @@ use crate::time::{Duration, Instant};
 use crate::wire::STATION_REACH;
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 
-/// Time for which a relay sends reports after its last Watch. A Watch is a ground station's request for reports.
+/// Time for which a relay goes on sending reports after the last Watch that it has received. A Watch is a ground
+/// station's request for reports.
 const WATCHED: Duration = Duration::from_millis(60_000);
 
 /// Time for which a relay sends its reports to the sender of the last Watch. A Watch is a request for reports. Ten
 /// lost Watches in a row do not change this destination.
 const DESTINED: Duration = Duration::from_millis(55_000);
 
-/// Time without any frame from a relay after which no more reports are sent to it. For a station it is three times as long.
+/// Time without any frame from a relay after which no more reports are sent to this relay. For a station as the
+/// destination of reports, this time is three times as long.
 const UNHEARD: Duration = Duration::from_millis(2_500);
 
 /// Time without a report from a relay after which the Watch to it (request for reports) is repeated.
@@ -61,18 +63,20 @@ const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 /// Control state of a drone that the relay controls.
 const ENGAGED: u16 = State::Engaged as u16 + 1;
 
-/// Time by which a report that begins an alarm is allowed to be sent early. Other reports wait until the telemetry's
+/// Time by which a report that begins an alarm may be sent earlier than other reports. Those wait until the telemetry's
 /// share of the data rate allows them.
 const AHEAD: Duration = Duration::from_millis(2_000);
 
-/// Minimum time between two successive states that a relay reports about itself. This time is longer than [`ROUNDING`].
+/// Minimum time from one state that a relay reports about itself to the next one. It is longer than [`ROUNDING`], so
+/// that the next state is not taken for a copy of the previous one.
 const STEP: Duration = Duration::from_millis(500);
 
-/// Maximum time difference between two copies of an entry (relay's state) that came by different ways. The copies
-/// differ because each relay rounds the age of an entry.
+/// Maximum time difference of two copies of an entry that came through different relays. An entry is the state of a
+/// relay in a report. The copies differ because each relay rounds the age of an entry.
 const ROUNDING: Duration = Duration::from_millis(300);
 
-/// Difference of the times at which two relays with consecutive numbers send entries that begin alarms.
+/// Extra delay of an alarm from each relay to the next one nearer to the station, on a shared channel. If all drones
+/// have the same fault, the relays farther from the station thus report first.
 const SPREAD: Duration = Duration::from_millis(30);
 
 /// Age above which a position of the drone counts as unknown.
@@ -119,8 +123,8 @@ struct Stored {
     detail: Option<Detail>,
     /// Time at which the relay was in the state of this entry.
     at: Instant,
-    /// Earliest time at which the entry may be sent. When the entry is sent, this time is set one period later. By then
-    /// a newer entry has usually replaced this entry.
+    /// Earliest time at which the entry may be sent, or sent again. Each transmission moves this time to one period
+    /// later. By then a newer entry has usually replaced this entry.
     from: Instant,
     rank: Rank,
 }
@@ -129,7 +133,7 @@ struct Stored {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Rank {
     /// The entry was sent with its details (additional state of the relay). The details are not sent again, even if a
-    /// copy of the entry with details arrives by a different way.
+    /// copy of the entry with details arrives through a different relay.
     Detailed,
     /// The entry was sent without details.
     Sent,
@@ -138,7 +142,7 @@ enum Rank {
     Alarm,
 }
 
-/// State of the reports toward one side, at which a ground station requests reports.
+/// State of this relay's reports toward one side, where a ground station has requested them.
 #[derive(Clone, Copy, Debug, Default)]
 struct Watched {
     number: u16,
@@ -148,7 +152,8 @@ struct Watched {
     to_until: Instant,
     /// Time of the last frame from node `to`, whatever the destination of the frame.
     heard: Instant,
-    /// Number of the last Watch from the relay four numbers nearer to the station. A Watch is a request for reports.
+    /// Number of the last Watch received from the relay four node numbers nearer to the station. A Watch is a request
+    /// for reports.
     far_number: u16,
     /// Nodes to which the Watch (request for reports) must be forwarded at the time `hand_on_at`. A bit mask of their
     /// distances from this relay.
@@ -158,7 +163,7 @@ struct Watched {
     /// node number four farther from the station than this relay.
     ///
     /// `unconfirmed` is `DIRECT` after a frame to the station. Otherwise it counts the Watches (requests for reports)
-    /// sent to the far relay since this time.
+    /// sent to the far relay since the time `confirmed`.
     confirmed: Instant,
     unconfirmed: u8,
     /// Node to which a handshake must be sent that requests a reply; `None` if there is none.
@@ -171,7 +176,7 @@ struct Watched {
     own_from: Instant,
     /// Number of entries that this relay has sent about itself, wrapping.
     count: u8,
-    /// True if entries of other relays have arrived since the last report.
+    /// True if entries (states of other relays) have arrived since this relay's last report.
     is_fed: bool,
     /// True if a change of this relay's state begins an alarm that has not been reported.
     is_alarmed: bool,
@@ -243,8 +248,8 @@ impl Reporting {
         }
     }
 
-    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if an entry belongs
-    /// to a relay from which no report can come through `from`.
+    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if the report has
+    /// the state of a relay whose reports cannot come through node `from`.
     pub(crate) fn handle(
         &mut self,
         now: Instant,
@@ -632,8 +637,8 @@ impl Reporting {
         (entries > 0).then_some(report)
     }
 
-    /// Returns the time between two reports, and this time divided by the length of a report in bytes. The reports of
-    /// all relays then take an eleventh of the data rate.
+    /// Returns the time from one report to the next, for each byte of the first one. With this time the reports of all
+    /// relays take an eleventh of the data rate.
     ///
     /// The data rate is assumed to be one sweep in each `hop_time`. On a shared channel it is also at least 2350 bytes
     /// for each relay in each `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). The reports use a tenth of these

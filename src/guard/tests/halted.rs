@@ -449,8 +449,8 @@ fn an_old_fence_gives_no_position_of_its_owner() {
     }
 }
 
-/// Checks that a relay reports the lowest x of itself and of the relays downstream. Relay 3 is 2.5 m before relay 2
-/// along x, within the errors of their reports. So relay 2 has to report the x of relay 3.
+/// Checks that a relay reports the lowest x of itself and of the relays downstream. The x of relay 3 is 2.5 m below
+/// that of relay 2, which the errors of their reports allow. So relay 2 has to report the x of relay 3.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {
@@ -499,10 +499,10 @@ fn gaps_that_are_negative_by_the_error_add_up() {
 }
 
 /// Checks that relay 2 raises its fence (limit of x for relay 3) after relay 1 has started beside it. Relay 3 was
-/// already beyond the fence before it was raised.
+/// already beyond the old fence.
 ///
-/// Relay 1, upstream, is in order with relay 2 only within the error of the reports. So the fence of relay 2 must be at
-/// least the separation beyond relay 1, too (rule 7 of the guard).
+/// Relay 1 is upstream, but reports a larger x than relay 2; the two are in order only because of the errors of
+/// reports. So the new fence must be at least the separation beyond relay 1, too (rule 7 of the guard).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

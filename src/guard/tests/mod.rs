@@ -427,7 +427,8 @@ fn the_owner_follows_the_follower() {
     );
 }
 
-/// Checks rules 1 and 5 of the guard for moves toward Tx. First relay 1 moves, then the fence, then relay 2.
+/// Checks rules 1 and 5 of the guard for moves toward Tx. First relay 1 moves, then its fence (lower limit of relay 2's
+/// x), then relay 2.
 #[test]
 fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -441,7 +442,7 @@ fn the_follower_follows_the_owner() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Checks rule 3 of the guard: no relay moves because of late messages, or of older fences.
+/// Checks rule 3 of the guard: neither a late message nor a replaced fence (limit of x) moves a relay.
 #[test]
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -474,9 +475,9 @@ fn late_messages_grant_nothing() {
     );
 }
 
-/// Checks that an old position report lets no neighbour move into the space that a relay will leave.
+/// Checks that an old position report of a relay does not let its neighbour come closer.
 ///
-/// The report is older than the setpoint, or too early to show its effect.
+/// The report is older than the setpoint, or too early to show the setpoint's effect.
 #[test]
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);

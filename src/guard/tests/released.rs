@@ -45,7 +45,8 @@ impl Row {
         }
     }
 
-    /// Passes the next message of relay `k` (0 to 2) to its neighbour, and returns it. `None` if none is pending.
+    /// Delivers the next fence message of relay `k` (0 to 2) to its neighbour, and returns the message. `None` if none
+    /// is pending.
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;
@@ -235,8 +236,8 @@ fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// Checks that a relay reports a neighbour in setpoint control that makes no room. It reports after five reminders
-/// (seconds), and not while it moves.
+/// Checks that a relay reports `Pending` if a neighbour in setpoint control does not make way for it. It reports this
+/// once its setpoint has not changed for five reminders (seconds), and not while it moves.
 #[test]
 fn a_relay_that_stands_for_long_reports_pending() {
     let mut row = Row::new();
@@ -284,8 +285,8 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// Checks that the notice of leaving an association (session) is repeated. The repetition ends when the neighbour has
-/// started a new association, but not when the pilot gives control back.
+/// Checks that a relay repeats the notice that it has left an association (session). It repeats the notice until the
+/// neighbour has started a new association, even if the pilot has given control back before.
 #[test]
 fn lost_messages_are_repeated() {
     let mut row = Row::new();

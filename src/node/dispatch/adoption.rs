@@ -17,9 +17,9 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
 
-/// Longest time for which a motion waits until the common start time is known.
+/// Longest wait of a motion for the common start time, which follows from the first lease renewal.
 ///
-/// The time from the turn of a lease renewal to this start time is added.
+/// The time between the last relay's answer to this renewal and the start is added.
 const WAIT: Duration = Duration::from_millis(15_000);
 
 impl Node {

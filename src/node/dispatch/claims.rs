@@ -103,10 +103,10 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if all authentication sessions must restart with it; otherwise `None`. Claim
-    /// numbers distinguish two nodes with one node number.
+    /// Returns the new claim number if the authentication sessions must restart; otherwise `None`. A claim number
+    /// distinguishes two nodes that use the same node number.
     ///
-    /// The new sessions count their nonces from this number.
+    /// The new sessions count their nonces from the claim number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
@@ -115,11 +115,10 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns the renewal's number if `message` is part of a lease renewal and a handshake must follow.
+    /// Returns a lease renewal's sequence number if `message` must be followed by a handshake.
     ///
-    /// `None` if `message` requires no handshake. On a shared channel one message of each lease renewal requires a
-    /// handshake. By this handshake a second node with the same number detects this relay, even if the chain sends no
-    /// other message.
+    /// `None` otherwise. On a shared channel, one message of each lease renewal is followed by a handshake. By this
+    /// handshake a second node with the same number detects this relay, even if the chain sends no other message.
     pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {
         let number = match message {
             Message::Pulse(pulse) if self.layers.neighbours.at(self.back()).has_no_peer() => {

@@ -25,12 +25,13 @@ use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::message::{Hello, Requests};
 
-/// Maximum distance of a drone in place from its setpoint along x, y and altitude, m.
+/// Maximum deviation in each of x, y and altitude at which a drone counts as in place, m. In place means at its agreed
+/// position, or as near to it as the guard permits beside a lost drone.
 const IN_PLACE_M: f32 = 3.0;
 
-/// Time after which an ordered departure counts as blocked, in units of `dead_after`. A departure is blocked if the
-/// neighbours of the relay that leaves do not receive each other. The departure is requested again after twice this
-/// time.
+/// Time from the order to leave until the departure counts as blocked, in units of `dead_after`. A departure is blocked
+/// if the neighbours of the relay that leaves do not receive each other. At twice this time after the order, the relay
+/// requests the departure again.
 const BLOCKED_AFTER: u32 = 4;
 
 /// State of a relay that leaves the chain or waits outside of it.
@@ -79,14 +80,14 @@ pub(crate) struct Leaving {
     /// True if this relay is a spare. Remains true if the spare requests to leave.
     spare: bool,
     free: bool,
-    /// True while the drone has no endurance for a return to the chain.
+    /// True while the drone has too little endurance for a return to the chain.
     spent: bool,
     /// Time of the first order to leave since the request; `None` without an order.
     ordered_at: Option<Instant>,
     /// Last reported position of the drone; `None` until a position is reported.
     place: Option<Placement>,
-    /// Position at which the drone counts as in place. `None` until the chain has agreed, and while the setpoint
-    /// moves.
+    /// Position that the drone must reach to be reported as in place. `None` until the chain has agreed, and while the
+    /// setpoint moves.
     goal: Option<Placement>,
     /// Spare (relay that waits outside) from which a frame was received last, and the time of this frame. `None` if no
     /// such frame was received.
@@ -122,7 +123,7 @@ impl Leaving {
         self.place = Some(place);
     }
 
-    /// Records the adoption of a view: the order to leave, given in the previous view, has ended.
+    /// Ends the order to leave, which was given in the previous view. Called when a view is adopted.
     pub(crate) const fn end_order(&mut self) {
         self.ordered_at = None;
         self.passed = [false; 2];
@@ -192,7 +193,8 @@ impl Layers {
         }
     }
 
-    /// Updates the requests of this relay to the leader, for the next lease renewal.
+    /// Updates this relay's requests to the leader, which go with the next lease renewal. They are the wish to leave, a
+    /// spare (relay that waits outside) that this relay receives, and the report that its drone is in place.
     pub(super) fn update_requests(&mut self, now: Instant, member: &Member) {
         let Leaving {
             requested,
@@ -263,7 +265,7 @@ impl Node {
         refusal.is_some_and(|why| lasting.contains(&why))
     }
 
-    /// Records if the drone has no endurance for a return to the chain: yes if `spent` is true.
+    /// Records if the drone has too little endurance for a return to the chain: yes if `spent` is true.
     pub(crate) const fn set_spent(&mut self, spent: bool) {
         self.layers.leaving.spent = spent;
     }
@@ -401,8 +403,8 @@ impl Node {
             && !self.steering.has_lost(side)
     }
 
-    /// Updates the position at which this relay counts as in place; `wanted` is the position to fly to. `None` if there
-    /// is no such position.
+    /// Updates the position that this relay must reach to report that it is in place. `wanted` is the position to fly
+    /// to; `None` if there is no such position.
     pub(super) fn update_goal(&mut self, wanted: Option<Placement>) {
         // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
         let is_held = [Side::Upstream, Side::Downstream]

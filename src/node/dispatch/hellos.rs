@@ -107,11 +107,11 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay fits between node `other` at `side` and the neighbour of `other`.
+    /// Returns true if this relay fits between node `other` at `side` and the neighbour B of `other`.
     ///
-    /// The neighbour of `other` must be on the opposite side of this relay. In addition, one of three conditions must
-    /// hold: this relay and that neighbour receive each other; this relay is linked to a node nearer than that
-    /// neighbour; or this relay's link crosses the link of `other`.
+    /// B must be on the opposite side of this relay. In addition, one of three conditions must hold: this relay and B
+    /// receive each other; this relay is linked to a node nearer than B; or this relay's link crosses the link from
+    /// `other` to B.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -131,8 +131,8 @@ impl Node {
         fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this relay. They are this relay, and all relays on
-    /// the side `far`, which is away from that neighbour.
+    /// Returns the number of relays that a node on one side of this relay can reach through it. They are this relay,
+    /// and all relays on the other side, `far`.
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. A relay that the view leaves out still has its
         // count from the view before, although no neighbour selects it.
@@ -222,7 +222,7 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records whether node `from` receives this relay (`heard`). After several reports in a row of failed reception,
+    /// Records whether node `from` receives this relay (`heard`). After several consecutive reports that it does not,
     /// the node is reported to the firmware.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);

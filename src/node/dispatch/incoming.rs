@@ -83,8 +83,7 @@ impl Node {
         true
     }
 
-    /// Returns true if `message` belongs to the current mission and view. The view is compared only for messages that
-    /// depend on it.
+    /// Returns true if `message` belongs to the current mission and, if it depends on a view, to that view.
     ///
     /// A message of a different mission or view is counted and answered by a hello. If it belongs to an agreement on
     /// positions, this relay also requests a new view.
@@ -252,7 +251,7 @@ impl Node {
     }
 
     /// Handles a valid handshake of node `from` at `side`. The handshake does not prove that the node receives this
-    /// relay, so the node counts as not receiving it.
+    /// relay, so the node is recorded as one that does not.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {

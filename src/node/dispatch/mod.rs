@@ -71,7 +71,8 @@ pub(crate) struct Node {
     pub(super) no_quorum_timer: NoQuorumTimer,
     /// Received claim that must be sent back to its sender as an echo; `None` if there is none.
     pub(super) echo: Option<Echo>,
-    /// Side to which this relay sends its next claim to its node number.
+    /// Side of the neighbour that receives this relay's next claim. Claims let two nodes with one node number detect
+    /// each other.
     pub(super) claim_side: Side,
     /// Votes on views that the firmware has confirmed as stored.
     persisted: ViewRecord,
@@ -86,7 +87,8 @@ impl Node {
     /// Creates a relay with valid `identity` and `settings`. The relay does nothing until [`begin`](Self::begin) is
     /// called.
     ///
-    /// The value has only plain numbers, so that the compiler can write it in place, without a copy on the stack.
+    /// All fields of the new value are plain numbers, so that the compiler can write it in place, without a copy on the
+    /// stack.
     pub(crate) fn new(
         mission: &Mission,
         identity: Identity,
@@ -360,7 +362,8 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` would leave out relays that will soon be linked.
+    /// Returns true if a view proposal from `side` comes too early: some relays there are not linked yet. The view
+    /// would leave out these relays, although their links will soon exist.
     ///
     /// This is assumed if the proposal has visited fewer relays than the previous proposal, and its sender has only
     /// just become the neighbour.
@@ -387,10 +390,10 @@ pub(super) struct Telemetry {
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time without a quorum until relays drop their links for the first time, in units of `dead_after`.
+/// Time without a quorum after which relays drop their links first, in units of `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time between later drops of the links, while there is still no quorum, in units of `dead_after`.
+/// Time from one drop of the links to the next while there is no quorum, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
 /// Timer after which a relay without a quorum drops its links and searches for other neighbours.

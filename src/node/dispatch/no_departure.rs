@@ -79,8 +79,8 @@ impl Node {
 
     /// Returns true if node `from` is outside of the chain and must not be selected.
     ///
-    /// False if node `from` is the neighbour. Its hello then shows that it has not selected this relay, and ends the
-    /// link.
+    /// False if node `from` is the neighbour: the hello then shows that `from` has not selected this relay, which ends
+    /// the link.
     pub(super) fn on_departure(&self, _: Instant, side: Side, from: u16, hello: &Hello) -> bool {
         hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
     }

@@ -81,8 +81,8 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `offer_number` is the number of a recent hello of this relay. Otherwise the offer is counted as
-    /// stale.
+    /// Returns true if `offer_number` is the nonce (random number) of a recent hello of this relay. Otherwise the offer
+    /// is counted as stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers
@@ -96,9 +96,9 @@ impl Node {
 
     /// Handles a mission offer from node `from` at `side`. The node has loaded the same mission before flight.
     ///
-    /// An offer without the number of a recent hello is answered by a hello. The next offer can contain the number of
-    /// that hello. Any other offer is answered only if this relay has stored or refused the mission, or has a newer
-    /// one. Otherwise the answer would trigger the same offer again.
+    /// An offer must repeat the nonce (random number) of a recent hello of this relay. If it does not, this relay sends
+    /// a hello with a nonce for the next offer. A valid offer is answered only if this relay now has its mission or a
+    /// newer one, or has refused it. Otherwise the answer would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -173,8 +173,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles a neighbour's report that the mission `refused` is refused. Either the neighbour or a relay beyond it
-    /// has refused it.
+    /// Handles a neighbour's report that the mission `refused` is refused. The neighbour itself, or a relay beyond the
+    /// neighbour, has refused this mission.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {

@@ -62,8 +62,8 @@ impl Node {
         self.reporting.poll(now, member, neighbours, wait, own)
     }
 
-    /// Returns the delay of telemetry reports. Above 0 only on a shared channel during an agreement on positions, which
-    /// needs the channel.
+    /// Returns the delay of telemetry reports, which keeps the channel free for an agreement on positions. It is above
+    /// 0 only on a shared channel during such an agreement.
     pub(super) fn telemetry_waits(&self) -> Duration {
         let is_idle = matches!(
             self.phase(),
@@ -208,7 +208,7 @@ mod tests {
         node.on_telemetry(now, Side::Downstream, from, &Message::Report(report));
     }
 
-    /// Passes a message of another mission of node `from` to the node.
+    /// Passes to the relay `node` a message of a different mission, which node `from` has sent.
     fn foreign(node: &mut Node, now: Instant, from: u16) {
         let mission = node.member.digest ^ 1;
         let watch = Message::Watch { number: 1, mission };
@@ -332,8 +332,8 @@ mod tests {
         assert_eq!(stored, Some(8), "{report:?}");
     }
 
-    /// Checks that an entry sent without details is sent again with the details of a later copy. An entry is the state
-    /// of a relay in a report. The copy arrives by a different way.
+    /// Checks that the details of an entry that was sent without them are sent once they arrive. An entry is the state
+    /// of a relay in a report. The details come with a copy of the entry, through another relay.
     #[test]
     fn details_that_were_not_sent_are_taken_from_a_copy() {
         let mut node = watched(1, Wiring::Shared);

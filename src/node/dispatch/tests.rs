@@ -309,8 +309,8 @@ fn an_offer_of_an_unselected_node_is_answered_once() {
     );
 }
 
-/// Checks that an offer that arrives too late is answered by a hello and not stored. A new offer that repeats the
-/// number of this hello is accepted.
+/// Checks that an offer that arrives too late is answered by a hello and not stored. A new offer that repeats the nonce
+/// of this hello is accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {

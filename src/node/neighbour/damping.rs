@@ -37,10 +37,10 @@ const MAX_FORGIVEN: u8 = 2;
 /// Minimum time between two losses of a slowly flapping link, in units of `dead_after`.
 const SLOW_INTERVAL: u32 = 10;
 
-/// Time without a loss after which earlier losses of a link no longer count, in units of `dead_after`.
+/// Time without a loss of a link after which older losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
-/// Node that is received without gaps: its distance, and the times of its first and last frame.
+/// Reception of one node without long gaps: its distance, and the times of its first and last frame.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     distance: u16,
@@ -49,8 +49,8 @@ struct Heard {
 }
 
 impl Heard {
-    /// Returns the record after a frame from the node at `distance`. It is a new record if the node was silent for
-    /// longer than `gap`, or if `known` is the record of a different node.
+    /// Returns the reception record of the node at `distance` after a frame from this node at `now`. The record begins
+    /// anew if the node was silent for longer than `gap`, or if `known` is the record of a different node.
     fn updated(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
             Some(known) if known.distance == distance && now.since(known.last) <= gap => {
@@ -71,14 +71,15 @@ impl Heard {
 struct Link {
     /// Time of the last loss of the link.
     lost_at: Instant,
-    /// Times of the first and the last frame since the last loss of the link; `None` without such a frame.
+    /// Reception of the node since the last loss of the link; `None` if no frame has arrived since.
     back: Option<Heard>,
     losses: u8,
-    /// True if the last loss does not count, because the channel was bad.
+    /// True if `losses` does not include the last loss, because the channel lost many frames. The loss is included if
+    /// the node turns out to have been silent for longer than `dead_after`.
     excused: bool,
     /// True if the node was silent for longer than `dead_after` after the last loss.
     was_down: bool,
-    /// Time between the last two losses of the link; 0 if there was no earlier loss that counts.
+    /// Time between the last two losses of the link; 0 if `losses` was 0 before the last one.
     interval: Duration,
 }
 
@@ -105,7 +106,7 @@ impl Link {
     }
 
     /// Returns true during the hold-down: the link was lost repeatedly and must not be used. The hold-down ends once
-    /// the node has been received without gaps for long enough.
+    /// the node has been received for long enough without a long silence.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(MAX_FORGIVEN + 1) else {
             return false;
@@ -117,7 +118,8 @@ impl Link {
 
     /// Records a loss of the link. `losses` is the number of recent losses before this one.
     ///
-    /// If `counted` is false, this loss counts only after a long silence of the node.
+    /// If `counted` is false, the number does not include this loss until the node has been silent for longer than
+    /// `dead_after` after it.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -137,7 +139,8 @@ impl Link {
 /// Losses of the links to the four nearest nodes on one side of the relay, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that will be selected once it has been received without gaps for long enough. `None` if there is none.
+    /// Node that will be selected once it has been received for long enough without a long silence. `None` if there is
+    /// none.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -167,11 +170,11 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the link to the node `distance` relays away. If `counts` is false, because the channel loses
-    /// many frames, only the loss of a flapping link counts.
+    /// Records the loss of the link to the node `distance` relays away. `counts` is false if the channel loses many
+    /// frames. The number of losses then rises only if the link flaps.
     ///
-    /// If a different link on this side of the relay flaps, the lost link takes over the number of losses of that link.
-    /// The reason is that all links on one side cross the same gap in the chain.
+    /// If a different link on this side of the relay flaps, the lost link takes over that link's number of losses, if
+    /// it is larger. The reason is that all links on one side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -187,7 +190,8 @@ impl Damping {
         }
     }
 
-    /// Records a frame of the node `distance` relays away. A long silence before it counts as a loss of the link.
+    /// Records a frame of the node `distance` relays away. A long silence of the node before this frame counts as a
+    /// loss of the link.
     ///
     /// `searching_since` is the start of the search; `None` if this side has a neighbour. During a search, a link
     /// counts as lost if its node has answered and then was silent for longer than `gap`.
@@ -227,8 +231,8 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the losses of all links on this side of the relay to those of the link lost last. These links were lost
-    /// together, because all of them cross the same gap in the chain.
+    /// Raises the number of losses of each link on this side of the relay to that of the link lost last. These links
+    /// were lost together, because all of them cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

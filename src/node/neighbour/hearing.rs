@@ -8,16 +8,16 @@ pub(crate) use crate::wire::CANDIDATES;
 /// Minimum interval between two reports to the firmware about one refused node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// Number of consecutive events at each of the four nearest nodes. An event is, for example, a handshake that is signed
-/// with a wrong key.
+/// Count of successive events of one kind, for each of the four nearest nodes. An event is, for example, a handshake of
+/// the node that is signed with a wrong key.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
 impl ConsecutiveCounts {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// Counts an event at the node `distance` relays away; resets the count if `occurred` is false. Returns true at the
-    /// `most`-th event in a row.
+    /// Counts an event of the node `distance` relays away; sets its count to 0 if `occurred` is false. Returns true
+    /// when the count has just become `most`.
     pub(super) fn count(&mut self, distance: u16, occurred: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {
@@ -32,7 +32,7 @@ impl ConsecutiveCounts {
         reached
     }
 
-    /// Returns true after at least `most` events in a row at the node `distance` relays away.
+    /// Returns true if the last `most` checks of the node `distance` relays away all found an event.
     pub(super) fn has(self, distance: u16, most: u8) -> bool {
         let times = self.0.get(usize::from(distance).wrapping_sub(1));
         times.is_some_and(|times| *times >= most)
@@ -47,9 +47,10 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Nodes on one side of the relay with a wrong mission or key, from the last one to two minutes.
+/// Nodes on one side of the relay that recently used a wrong mission or a wrong key.
 ///
 /// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with a wrong key; the nearest node is first.
+/// A bit remains set for one to two minutes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refusals {
     since: Instant,
@@ -84,7 +85,7 @@ impl Refusals {
 
     /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
     ///
-    /// Only nodes fewer than `end` relays away count.
+    /// Nodes `end` or more relays away are left out.
     pub(super) fn nearest(mut self, now: Instant, end: u16) -> [u16; 2] {
         self.age(now);
         let nodes = self.now | self.before;

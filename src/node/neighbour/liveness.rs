@@ -30,14 +30,14 @@ use crate::time::{Duration, Instant};
 /// After a silence as long as the maximum lease, it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor on the longest recent run of unanswered heartbeat requests, for the loss of a neighbour. A neighbour counts
-/// as lost only after at least three times as many unanswered requests.
+/// Factor that determines how many unanswered heartbeat requests show the loss of a neighbour. At least three times as
+/// many are needed as in the longest recent run of unanswered requests.
 const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour.
 ///
-/// It is the round trip through `all` relays, but short enough for sixteen requests between `probe_after` and
-/// `dead_after`.
+/// It is the round trip through `all` relays, but short enough for sixteen requests between a silence of `probe_after`
+/// and a silence of `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
@@ -45,12 +45,12 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
 /// Returns the interval between heartbeat requests before the first agreement on positions.
 ///
 /// The interval is longer than [`tick`], because many relays then search on one channel. It is short enough for three
-/// requests between `probe_after` and `dead_after`.
+/// requests between a silence of `probe_after` and a silence of `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
 
-/// Returns the time from the first heartbeat request to the loss of a neighbour, in µs. It is `dead_after` -
+/// Returns the time from the first heartbeat request to the loss of a silent neighbour, in µs. It is `dead_after` -
 /// `probe_after`.
 const fn waiting(settings: &Settings) -> u64 {
     let dead = settings.dead_after.as_micros();
@@ -98,7 +98,7 @@ pub(crate) struct Liveness {
     lost: bool,
     /// True if the neighbour has been received since the start, or since it was lost.
     was_received: bool,
-    /// Number of the last heartbeat request to the neighbour, 0 if none was sent.
+    /// Sequence number of the last heartbeat request to the neighbour; 0 if none was sent.
     request_number: u16,
     /// Times of the last heartbeat requests, latest first.
     request_times: [Instant; REMEMBERED_REQUESTS],
@@ -138,11 +138,12 @@ impl Liveness {
         }
     }
 
-    /// Restarts the record, because a different node is the neighbour now. The longest run of unanswered requests is
-    /// kept, because that number describes the channel.
+    /// Restarts the record, because a different node is the neighbour now. The longest run of unanswered heartbeat
+    /// requests is kept, because it measures the losses of the channel.
     ///
-    /// The unanswered requests to the previous node count as a run, unless `was_down` is true: then they measure an
-    /// outage of the link. If `flaps` is true (the link flaps slowly), all runs are dropped.
+    /// The requests that the previous node has not answered are such a run, too, unless `was_down` is true: then they
+    /// show an outage of the link. If `flaps` is true (the link flaps slowly), the longest run is reset to its initial
+    /// value.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS

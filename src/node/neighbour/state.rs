@@ -80,8 +80,8 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side of the relay that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
-    /// Neighbours toward this relay that the four nearest nodes on one side of the relay have selected. 0 stands for no
-    /// neighbour. The entry of the nearest node is the first.
+    /// Neighbours that the four nearest nodes on this side have selected toward this relay; 0 for none. The entry of
+    /// the nearest node is the first.
     pub(super) selection: [u16; CANDIDATES as usize],
     /// Time of the last frame on this side of the relay from a node that is not the neighbour. `None` if there was
     /// none.
@@ -214,8 +214,8 @@ impl Neighbour {
         back
     }
 
-    /// Returns true if this relay and its neighbour have selected each other. The neighbour's last report shows its
-    /// selection.
+    /// Returns true if this relay and its neighbour have selected each other. The selection of the neighbour is that in
+    /// its last report.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }
@@ -508,9 +508,10 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, not counting the nearest.
+    /// Returns the number of nodes between this relay and the candidate, without the nearest of them.
     ///
-    /// The nearest node is lost. Each of the others could still answer, and so delays the selection of the candidate.
+    /// The nearest of them is lost. Each of the others could still answer, and so delays the selection of the
+    /// candidate.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -640,8 +641,8 @@ const NOT_RECEIVED: u8 = 8;
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Returns true if this relay and the node `distance` relays away receive each other. A flapping link that is held
-    /// down does not count.
+    /// Returns true if this relay and the node `distance` relays away receive each other. A link that was lost
+    /// repeatedly, and is therefore not used for a while (held down), does not count.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held_down_nodes(now, settings);
         let is_in = |nodes: u8| mask(distance) & nodes != 0;
@@ -730,7 +731,7 @@ impl Neighbour {
 
     /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
     ///
-    /// A refusal counts for one to two minutes. Only nodes fewer than `end` relays away count.
+    /// A wrong mission or key is remembered for one to two minutes. Nodes `end` or more relays away are left out.
     pub(crate) fn refused(&self, now: Instant, end: u16) -> [u16; 2] {
         self.refusals.nearest(now, end)
     }

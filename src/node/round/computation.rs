@@ -383,8 +383,8 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if no other algorithm follows this search.
         last: bool,
-        /// True for a search at the configured altitudes, because those of the joint method failed. No target was
-        /// feasible at the joint method's altitudes.
+        /// True for the search at the configured altitudes. It follows if no target was feasible at the joint method's
+        /// altitudes.
         given: bool,
     },
     /// Algorithm 2, in which the relays move one after the other.
@@ -486,9 +486,9 @@ pub(crate) struct SweepPass {
     /// True if a relay farther along the sweep has a power or fixed altitude other than the mission's.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x in the direction of the sweep at which the previous node meets each target SIR, m.
+    /// Farthest x of the previous node along the sweep that meets the target SIR, m; one x per target.
     from: PerTarget,
-    /// Farthest x in the direction of the sweep at which this relay meets each target SIR, m.
+    /// Farthest x of this relay along the sweep that meets the target SIR, m; one x per target.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
@@ -723,8 +723,8 @@ impl TurnPass {
 pub(super) struct Seats {
     /// Number of relays, from Tx on, whose profiles are known. `None` before the first collection of profiles.
     pub(super) known: Option<u16>,
-    /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it. The power is 0 if the relay
-    /// has the power and altitude of the mission's common profile.
+    /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses its altitude itself. The power
+    /// is 0 if the relay has the power and altitude of the mission's common profile.
     own: [[f32; 2]; MOST_SOLVED],
 }
 
