@@ -292,8 +292,8 @@ impl Steering {
         }
     }
 
-    /// Removes the limits on the setpoint that keep clear of lost relays at `side`. Called when these relays are no
-    /// longer in the air. `others` is true if the view has relays at this side that are not lost. Until the guard has
+    /// Removes the limits that keep the setpoint clear of lost relays at `side`. Called when these relays are no longer
+    /// in the air. `others` is true if the view has relays at this side that are not lost. Until the guard has
     /// received a message of one of these remaining relays, it does not move the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {

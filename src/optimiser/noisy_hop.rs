@@ -120,8 +120,9 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes sign. `None` if g is
-    /// concave everywhere. g is 0 or above where the target is met.
+    /// Returns the distance along x from the interferer, m, where the margin g's curvature changes sign. `None` if g
+    /// is concave everywhere. The margin g is a function of the hop length; it is 0 or above where the target is
+    /// met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {

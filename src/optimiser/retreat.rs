@@ -229,8 +229,8 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest x of this hop's receiver, m, from which the backward hop meets `target`. This hop's sender
-    /// is at x = `place`, and receives the backward hop. The result is infinite for data in one direction, and
+    /// Returns the largest x of this hop's receiver, m, at which the backward hop from it meets `target`. The backward
+    /// hop leads to this hop's sender, which is at x = `place`. The result is infinite for data in one direction, and
     /// -infinite if no x meets `target`.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
@@ -447,7 +447,8 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the part of the field from `start_m`, m, to the next point of the field, at most to `end_m`.
+    /// Returns the part of the interference field between `start_m`, m, and the field's next point in x. The part ends
+    /// at `end_m`, m, if the next point is beyond.
     #[inline(never)] // one copy for all loops
     fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {

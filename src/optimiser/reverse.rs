@@ -140,11 +140,11 @@ impl Back {
     }
 }
 
-/// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
+/// Returns the distance along x from the interferer, m, within which q is less than `needed`, m^2.
 ///
-/// q = s / (1 + `noise` s) is the inverse of interference plus noise. s is the squared distance from the interferer,
-/// m^2; `aside_squared` is its part perpendicular to x. `None` if q is less than `needed` at any distance, because of
-/// the noise.
+/// q = s / (1 + `noise` s) is the inverse of interference plus noise at a receiver. s is the squared distance from the
+/// interferer to the receiver, m^2; `aside_squared` is its part perpendicular to x. `None` if q is less than `needed`
+/// at any distance, because of the noise.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

@@ -141,8 +141,8 @@ impl Round {
         }
     }
 
-    /// Carries out the action `next`, and returns the effects on the relay's views, leases and neighbours. The effects
-    /// include the sensing results that have changed since `before`.
+    /// Carries out the action `next`, and returns the effects on the other parts of the relay. The effects include
+    /// the sensing results that have changed since `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {

@@ -537,7 +537,7 @@ pub(super) struct ViewVerdict {
 ///
 /// | situation | wait before the request | set by |
 /// | --- | --- | --- |
-/// | reason for a view | 250 us | `request_now` |
+/// | reason for a new view, such as a changed neighbour | 250 us | `request_now` |
 /// | repetition without a result | 8 hop times at first, each time doubled, at most `probe_after` | `poll_due` |
 /// | refused view | about `probe_after`, doubled with each refusal in a row, at most three times | `request_after_refusal` |
 /// | new reason after a refusal | the rest of the first `probe_after` | `start` |

@@ -104,7 +104,7 @@ fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     assert_eq!(found.what, ONE_CHAIN, "{}", found.how);
 }
 
-/// Model check of the view change with more events; takes some minutes.
+/// Model check of the view change with more events than the tests above; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {

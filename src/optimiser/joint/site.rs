@@ -25,8 +25,8 @@ pub(super) const MARGIN: f32 = 1.0005;
 /// result of the previous step (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Number of bisection steps of [`Site::halved`]. It searches along a line for the farthest position at which a hop
-/// meets its target.
+/// Number of bisection steps of [`Site::halved`]. This function searches along a line for the farthest
+/// position at which a hop meets its target.
 const HALVINGS: u8 = 12;
 
 /// Relay to be placed by the joint method, with the sender of the hop to it.

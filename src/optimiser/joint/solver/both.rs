@@ -263,9 +263,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     /// Excludes a range of x for the relay next to the end (Tx or Rx) with more power. In this range, beyond the
     /// interferer as seen from that end, the relay's SIR rises with its distance from the end.
     ///
-    /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
-    /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
-    /// interferer from the line is replaced by its distance from the relay's cross-section.
+    /// Let the relay be at x from that end, the interferer at X, and a the distance of the interferer from the line
+    /// Tx-Rx. The SIR is then proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2.
+    /// Instead of this a, the function uses the interferer's distance from the relay's lateral offset and altitude.
     fn close_beyond(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let (distance_m, is_turned) = (chain.distance_m(), is_turned(chain));
         let index = if is_turned { chain.relays() } else { 1 };
