@@ -161,7 +161,7 @@ pub(super) struct SensorState {
     pub(super) receiver: Average,
     /// True while this relay withholds its measurements because they contradict those of all other nodes.
     pub(super) off: bool,
-    /// Node whose measurements the last collection left out; 0 for none.
+    /// Node that the last collection of measurements excluded, for a possibly faulty sensor; 0 for none.
     pub(super) left_out: u16,
     /// Node whose sensor counts as faulty, according to the leader or the node itself; 0 for none.
     pub(super) named: u16,
@@ -180,7 +180,7 @@ pub(super) struct SensorState {
     pub(super) silent_at: Placement,
     /// True once the view's relays have received the current estimate. Only the leader knows this.
     pub(super) is_distributed: bool,
-    /// Number and expected error of the measurements from which the current estimate was computed.
+    /// Quality of the current estimate when it was adopted, and the track (motion) of the interferer.
     pub(super) known: Knowledge,
     /// Reason why the last collected measurements gave no estimate; `None` if they gave an estimate.
     pub(super) unfit: Option<Unfit>,
@@ -363,10 +363,11 @@ impl SensorState {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums over the measurements of all relays before this one, as received from the previous relay.
+    /// Sums over the measurements of all relays before this one, as received from the previous relay. The leader
+    /// computes the interference estimate from such sums.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the current estimate was already known at the agreement on positions. No new agreement is then needed.
+    /// True if this relay's agreed position is based on the current estimate. No new agreement is then needed.
     pub(super) holds: bool,
 }
 

@@ -9,8 +9,8 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Time after which the relay repeats its fence messages to the neighbours: a message can be lost. A fence is the plane across x that keeps
-/// two neighbours apart.
+/// Interval at which the relay repeats its fence messages to the neighbours. A message can be lost. A fence is the
+/// plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
 /// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
@@ -18,7 +18,8 @@ const REMINDER: Duration = Duration::from_millis(1_000);
 pub(crate) struct Steering {
     guard: Option<Guard>,
     remind_at: Option<Instant>,
-    /// Setpoint last reported to the firmware; `None` if the relay had no setpoint then.
+    /// Setpoint last reported to the firmware. `None` before the first report, and if the last report was that there is
+    /// no setpoint.
     reported_setpoint: Option<Placement>,
     /// Stepwise motion to a new agreed position; the array is empty without the feature `departures`.
     way: [Way; DEPARTURES as usize],
@@ -47,11 +48,12 @@ pub(crate) enum Begin {
     By(Instant),
 }
 
-/// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that they arrive together.
+/// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that
+/// they arrive together.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position at the last call of `advance`. The next field, `wanted`, is the position to fly to now: it approaches the agreed
-    /// position in steps.
+    /// Agreed position at the last call of `advance`. The next field, `wanted`, is the position to fly to now: it
+    /// approaches the agreed position in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
     /// Motion to the agreed position; `None` once the position to fly to has reached the agreed position.
@@ -68,7 +70,8 @@ impl Way {
     /// Returns the position to fly to at `now`; `None` without an agreed position. If the agreed position `agreed` has
     /// changed, the position to fly to moves there in 32 steps within the time `span`.
     ///
-    /// The motion begins at `begin`, the same time at all relays of the view.
+    /// `begin` states the common start time of this motion at all relays of the view, or the latest start time while
+    /// the common one is unknown.
     fn advance(
         &mut self,
         now: Instant,
@@ -143,7 +146,7 @@ impl Way {
 }
 
 impl Steering {
-    /// State before [`begin`](Self::begin): no guard, and no setpoint.
+    /// State before the call of [`begin`](Self::begin): no guard (collision avoidance), and no setpoint.
     pub(crate) const NONE: Self = Self {
         guard: None,
         remind_at: None,
@@ -151,8 +154,8 @@ impl Steering {
         way: [Way::NONE; DEPARTURES as usize],
     };
 
-    /// Creates the guard (collision avoidance), if `settings` request a guard. `neighbours` are the node numbers on the
-    /// two sides.
+    /// Creates the guard (collision avoidance), if `settings` request a guard. `neighbours` are the node numbers of
+    /// this relay's two neighbours in the chain; `None` at an end of the chain.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,
@@ -175,7 +178,7 @@ impl Steering {
     }
 
     /// Moves the setpoint toward the position `agreed` as far as the guard allows at `now`. Returns true if the
-    /// setpoint has changed. A motion to a new position takes `span`, and begins at `begin`.
+    /// setpoint has changed. If `agreed` is new, the motion to it begins at `begin`, and takes the time `span`.
     pub(crate) fn steer(
         &mut self,
         now: Instant,
@@ -210,7 +213,8 @@ impl Steering {
         matches!(&self.way[..], [way] if way.motion.is_some())
     }
 
-    /// Returns the position to fly to if the motion stops now; `None` until the chain has agreed.
+    /// Returns the point that the motion to the agreed position has reached, before the guard limits it. `None` until
+    /// the chain has agreed on positions.
     pub(crate) fn stopped(&self) -> Option<Placement> {
         self.way.first()?.wanted
     }
@@ -256,8 +260,8 @@ impl Steering {
         }
     }
 
-    /// Records at `now` that the drone follows the setpoints (`flown` is true) or does not (false). Returns true if this changes the state
-    /// of the guard.
+    /// Records if the drone follows the setpoints (`flown` is true) or not (false) at the time `now`. Returns true if
+    /// this changes the state of the guard.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -288,16 +292,16 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air.
-    /// `others` is true if some relays of the view at this side are not lost. Until the guard has received a message of
-    /// one of these remaining relays, it does not move the setpoint toward this side.
+    /// Removes the limits that keep the setpoint clear of lost relays at `side`. Called when these relays are no longer
+    /// in the air. `others` is true if the view has relays at this side that are not lost. Until the guard has
+    /// received a message of one of these remaining relays, it does not move the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
         }
     }
 
-    /// Returns true if a lost relay toward `side` may still hover.
+    /// Returns true if some lost relay on the side `side` may still hover in the air.
     pub(crate) fn has_lost(&self, side: Side) -> bool {
         self.known_guard().is_some_and(|guard| guard.has_lost(side))
     }

@@ -84,7 +84,8 @@ impl FromRx {
     }
 
     /// Returns the largest x in [`least_m`, `x_m`], m, at which the hop from Rx has the required SIR. The required SIR
-    /// is `target` times the mission's ratio `reverse`. At `x_m` the SIR must be lower. `None` if there is no such x.
+    /// is `target` times the mission's ratio `reverse`. The SIR at `x_m` must be below the required one. `None` if
+    /// there is no such x.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -99,8 +100,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay stays farther from Rx if its SIR from Rx is too low. The search starts at x = 650 m,
-    /// a strong interferer is at x = 700 m, and Rx at x = 1000 m.
+    /// Checks that the last relay gets an x below 650 m if its SIR from Rx is too low at 650 m. A strong interferer is
+    /// at x = 700 m, and Rx at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -11,7 +11,7 @@ use crate::root::sqrt;
 /// Number of target SIRs in a full ladder, the list of targets of one sweep along the chain.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps between targets 7 and 15 of a full ladder, a list of the targets 0 to 15.
+/// Number of gaps from target 7 to target 15. The 16 targets of a full ladder are numbered 0 to 15.
 const HALF: usize = TARGETS / 2;
 
 /// Ladder: rising list of target SIRs, linear, for one pass along the chain (a sweep). Encoded as one target and two
@@ -29,13 +29,13 @@ pub struct Ladder {
     /// next gap toward the middle.
     growth: u8,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stop before
-    /// that x to help the next relay on the pass.
+    /// that x, so that the next relay of the pass gets farther.
     plain: bool,
 }
 
 impl Ladder {
-    /// Returns a ladder (list of targets) with the single SIR `target`, above 0. If the chain meets `target`, the
-    /// last relay commits the chain to it.
+    /// Returns a ladder (list of targets) with the single SIR `target`, above 0. If the chain meets `target`, the last
+    /// relay commits the chain to it: the relays take their positions for `target`.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -52,7 +52,7 @@ impl Ladder {
     }
 
     /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. Otherwise a
-    /// relay may stop before this x to help the next relay.
+    /// relay may stop before this x, so that the next relay gets farther.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
@@ -76,8 +76,8 @@ impl Ladder {
     }
 
     /// Returns 16 targets (a ladder) that are dense around `centre` and span [`low`, `high`]. `centre` is in the middle
-    /// of a gap between two targets. This gap is `gap` times its lower target wide. All other gaps grow with their
-    /// distance from it.
+    /// of a gap between two targets. The width of this gap is `gap` times its lower target. All other gaps grow with
+    /// their distance from it.
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
@@ -129,7 +129,8 @@ impl Ladder {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true if the ladder has a single target. If the chain meets it, the last relay commits the chain to it.
+    /// Returns true if the ladder has a single target. If the chain meets this target, the last relay commits the chain
+    /// to it: the relays take their positions for it.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }

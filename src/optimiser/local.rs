@@ -31,8 +31,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals of x on each side of the interferer, toward Tx and toward Rx. Used for data in both
-/// directions: the search evaluates both hops at the ends of the intervals.
+/// Number of equal intervals of x on each side of the interferer, for data in both directions. One side is toward Tx,
+/// the other toward Rx. The search evaluates both hops of the relay at the ends of the intervals.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -41,11 +41,12 @@ const ROUNDING: f32 = 3e-7;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Coarse-to-fine search over altitudes. It evaluates both hops at most 1080 times; 8730 times for data in both
-    /// directions.
+    /// Coarse-to-fine search over altitudes. It evaluates the relay's two hops at up to 1080 positions; for data in
+    /// both directions, at up to 8730 positions.
     #[default]
     Fine,
-    /// Search on the paper's grid of positions. It evaluates both hops `columns` times `rows` times.
+    /// Search on a grid of positions, as in the paper. It evaluates the relay's two hops at `columns` times `rows`
+    /// positions.
     Grid {
         /// Number of positions of the grid along x, including the positions of the neighbours, 2 to 255.
         columns: u8,
@@ -65,12 +66,12 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Two hops of a relay at any position: from the next node toward Tx, and to the next node toward Rx.
+/// Two hops of a relay at any position: with the next node toward Tx, and with the next node toward Rx.
 ///
-/// l is the squared length of a hop, and q the inverse interference at the relay. For the hop from the node toward Tx
-/// the SIRs are A q / l, with the gain A, and backward `returned` / l. For the hop to the node toward Rx they are
-/// `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the required ratio of
-/// backward to forward SIR.
+/// l is the squared length of a hop, q the inverse interference at the relay, and A and A' are gains. The SIRs for data
+/// toward Rx are A q / l from the node toward Tx, and `received` / l to the node toward Rx. The SIRs for data toward Tx
+/// (backward) are A' q / l from the node toward Rx, and `returned` / l to the node toward Tx. These two are divided by
+/// r, the required ratio of backward to forward SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
@@ -78,7 +79,7 @@ pub struct Hops {
     /// Gain A of the hop from the node toward Tx. The hop's SIR is A times the inverse interference, divided by the
     /// squared length.
     gain: f32,
-    /// SIR with which the next node toward Rx receives this relay, times the squared hop length, m^2.
+    /// SIR of the hop from this relay to the next node toward Rx, times the squared hop length, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
@@ -90,7 +91,8 @@ pub struct Hops {
 /// gains are infinite for a mission without data from Rx to Tx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// SIR with which the next node toward Tx receives this relay, times the squared hop length, m^2.
+    /// SIR of the backward hop to the next node toward Tx, times the squared hop length, m^2. The SIR is divided by r,
+    /// as in [`WayBack`].
     returned: f32,
     /// Gain A' of the backward hop from the node toward Rx to the relay.
     gain: f32,
@@ -190,7 +192,7 @@ impl Hops {
         REVERSE && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the SIR of the worse of the two hops with the relay at `at`: the paper's local SIR.
+    /// Returns the SIR of the worse of the two hops, with the relay at `at`. The paper calls it the local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
@@ -226,11 +228,11 @@ pub struct LocalSearch {
     round: u8,
     row: u8,
     column: u8,
-    /// Best altitude of the current round, m, and the SIR of the worse hop there.
+    /// Altitude of the current round at which the worse hop is best, m, and the SIR of this hop.
     best_row: (f32, f32),
     /// Best position found so far; `None` if no position is better than the relay's current one.
     found: Option<Placement>,
-    /// Linear SIR of the worse hop at the best position found; at the current position if none is found.
+    /// Linear SIR of the worse hop at `found`, or at the current position if `found` is `None`.
     best_sir: f32,
     /// Number of evaluations of both hops at the current altitude. The count stays 0 in a mission with data in one
     /// direction.
@@ -266,8 +268,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search until `budget` evaluations of both hops are used. The search at an altitude is completed,
-    /// even if it needs more: 24 evaluations, or 194 for data in both directions.
+    /// Continues the search until at least `budget` evaluations of both hops are used. The call also completes the
+    /// search at the current altitude, which can take 24 evaluations, or 194 for data in both directions.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -285,13 +287,14 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Records `at` as the best position if it is allowed and better than all earlier positions. Returns the SIR of
-    /// the worse hop at this position, or -1 if the position is not allowed.
+    /// Records `at` as the best position if it is better than all earlier positions. The relay at `at` must keep its
+    /// minimum distance from both neighbours. Returns the SIR of the worse hop at this position, or -1 if the relay is
+    /// too close to a neighbour.
     fn weigh(&mut self, at: Placement) -> f32 {
         self.record(at, self.hops.worse(at))
     }
 
-    /// Records `at`, whose worse hop has the SIR `sir`, as [`weigh`](Self::weigh) does.
+    /// Records the position `at` as [`weigh`](Self::weigh) does. `sir` is the SIR of the worse hop there.
     fn record(&mut self, at: Placement, sir: f32) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
@@ -367,9 +370,9 @@ impl LocalSearch {
 
     /// Returns the best SIR of the worse hop for x in `low` to `high`, for data in both directions.
     ///
-    /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where the
-    /// SIRs of both hops are equal can be narrower than the spacing, so the first two x with equal SIRs are searched by
-    /// bisection.
+    /// The search evaluates evenly spaced x, and improves the best of them by steps, each half as long as the last. A
+    /// maximum where the SIRs of both hops are equal can be narrower than the spacing, so the first two x with equal
+    /// SIRs are searched by bisection.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
@@ -446,7 +449,7 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns the search of a relay between two neighbours, which are 100 m from each other. `altitude_m` is the
+    /// Returns a search for the best position of a relay between two neighbours 100 m apart. `altitude_m` is the
     /// relay's altitude, and `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band`
     /// the allowed altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {

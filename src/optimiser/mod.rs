@@ -22,5 +22,6 @@ pub mod reverse;
 pub mod search;
 pub mod spacing;
 
-/// List with one number for each target SIR of a pass, for example a relay's farthest x, m.
+/// List with one number for each target SIR of a pass along the chain. An example is a relay's farthest x for each
+/// target, m.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

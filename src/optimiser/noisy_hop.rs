@@ -39,8 +39,8 @@ use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum ratio of a hop's target SIR to its gain. With a larger ratio no hop is short enough. The limit keeps all
-/// numbers finite.
+/// Maximum ratio of a hop's target SIR to its gain. With a larger ratio the hop meets its target at no length. The
+/// limit keeps all numbers finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
@@ -49,8 +49,8 @@ const STEPS: u8 = 32;
 /// Maximum number of steps of a search by bisection. Each step at least halves the interval.
 pub(super) const HALVINGS: u8 = 32;
 
-/// Number of Newton steps for the hop length at which the curvature of the margin g changes its sign. g is 0 or above
-/// where a hop with noise meets its target.
+/// Number of Newton steps in the search for the inflection of a hop's margin g. The margin is a function of the hop
+/// length, and is 0 or above where a hop with noise meets its target.
 const TURNS: u8 = 5;
 
 /// Rounding error of the margin of a hop with noise, as a fraction of the required value. A target that is missed by at
@@ -65,7 +65,7 @@ const CLOSE: f32 = 5e-7;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
     /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times the inverse interference, divided by
-    /// the squared length.
+    /// the squared length of the hop.
     pub(super) ratio: f32,
     /// Difference rho - 1, computed without cancellation. rho is the hop's target SIR divided by its gain.
     pub(super) excess: f32,
@@ -83,8 +83,8 @@ pub(super) struct NoisyHop {
 }
 
 impl NoisyHop {
-    /// Returns the hop length along x, m, up to which the SNR alone meets the target, at most 1e9. `None` if no length
-    /// does.
+    /// Returns the maximum hop length along x, m, for noise without interference; at most 1e9. `None` if the SNR misses
+    /// the target at every length.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
@@ -96,10 +96,10 @@ impl NoisyHop {
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error.
+    /// Returns the margin g for the hop length `d`, half the derivative of g by d, and g's rounding error.
     ///
-    /// g, m^2, is at least 0 if the hop meets its target SIR. `d` is along x, m, and so short that the noise alone does
-    /// not make the hop miss the target.
+    /// The margin g, m^2, is 0 or above if the hop meets its target SIR. `d` is the length along x, m. It must be so
+    /// short that the noise alone does not make the hop miss the target.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -120,8 +120,9 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes sign. `None` if g is
-    /// concave everywhere. g is 0 or above where the target is met.
+    /// Returns the distance along x from the interferer, m, where the margin g's curvature changes sign. `None` if g
+    /// is concave everywhere. The margin g is a function of the hop length; it is 0 or above where the target is
+    /// met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -167,9 +168,9 @@ impl NoisyHop {
     }
 
     /// Returns the largest hop length from `low` to `high`, m, that meets the target. `None` if there is none. The
-    /// margin g is 0 at the result; at lengths that meet the target it is 0 or above.
+    /// margin g is 0 or above where the target is met, and 0 at the result.
     ///
-    /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
+    /// Apart from rounding errors, g must be concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -192,10 +193,10 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 at the result;
-    /// at lengths that meet the target it is 0 or above.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 or above where
+    /// the target is met, and 0 at the result.
     ///
-    /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
+    /// The margin g must be convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {
@@ -220,7 +221,7 @@ impl NoisyHop {
     }
 }
 
-/// Returns `x_m` - `d`, m, rounded down. The result is at least `d` smaller than `x_m`, in spite of rounding.
+/// Returns `x_m` - `d`, m, rounded down. Even after rounding, the result is at least `d` below `x_m`.
 pub(super) fn before(x_m: f32, d: f32) -> f32 {
     let place = x_m - d;
     if x_m - place < d {
@@ -250,7 +251,7 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
 }
 
 /// Returns the length, m, above which a hop without noise meets the target. The margin to the target is 0 at this
-/// length, and rises with it. `None` if there is no such length; the length can be negative.
+/// length, and positive just above it. `None` if there is no such length; the length can be negative.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -273,7 +274,7 @@ mod tests {
     use super::{NoisyHop, closest};
     use crate::features::NOISE;
 
-    /// Returns the smallest length at which `hop` meets its target, m, by trial in fine steps. Reference for
+    /// Returns the smallest of 20 001 evenly spaced lengths, m, at which `hop` meets its target. Reference for
     /// [`closest`].
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;

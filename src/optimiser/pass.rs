@@ -28,22 +28,22 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of x that the last relay tries, to receive Rx with the required SIR. Used only for data in both
-/// directions.
+/// Maximum number of x that the last relay tries for a sufficient SIR of the hop from Rx to it. Used only for data in
+/// both directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of points of the interference field that one call evaluates. The evaluation of one target is
 /// completed even if it needs more.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Previous relay of a pass along the chain, as its message describes it.
+/// Data of the previous relay of a pass along the chain, as stated in its message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
     /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
     /// Upsilon, the mean inverse interference power that the previous relay has measured, 1/W. `None` to use the
-    /// mission's interference field. Only passes toward Tx use this value.
+    /// mission's interference field. Only passes from Rx to Tx, in an interference field, use this value.
     pub measured_per_w: Option<f32>,
 }
 
@@ -58,8 +58,8 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all data to compute its reach for a target SIR. The reach is the x farthest
-/// along the pass at which the relay meets the target.
+/// Relay in a pass along the chain, with all data to compute its reach for a target SIR. The reach is the x at which
+/// the relay meets the target and is farthest in the direction of the pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
@@ -74,13 +74,13 @@ pub struct Link<'a> {
     /// interference field.
     pub measured_per_w: Option<f32>,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stop before
-    /// that x to help the next relay on the pass.
+    /// that x, so that the next relay of the pass gets farther.
     pub plain: bool,
-    /// Maximum x of the relay, m. It leaves the relays toward Rx space for their separation. `None` unless the joint
-    /// method has computed it. Not used in an interference field.
+    /// Maximum x of the relay, m, which leaves the relays toward Rx space for their separation. `None` unless the joint
+    /// method, which optimises x, y and altitude together, has computed it. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// Fixed x of this relay, m; `None` unless the mission has fitted slots (as long as each hop needs). The relay has
-    /// this x for every target that its hop meets there.
+    /// Fixed x of this relay, m; `None` unless the mission has fitted slots (as long as each hop needs). The relay
+    /// takes this x for every target that the hop to it meets there, and has no x for other targets.
     pub fixed_m: Option<f32>,
 }
 
@@ -99,7 +99,7 @@ pub fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends this relay's reaches for all `targets` whose reach is not in the list `reaches` yet. A reach is the x
+    /// Appends this relay's reaches for the remaining `targets`: those from index `reaches.len()` on. A reach is the x
     /// farthest along the pass at which the relay meets a target.
     ///
     /// `targets` is in ascending order, and entry i of each list belongs to target i. `from` has the reaches of the
@@ -165,8 +165,8 @@ impl<'a> Link<'a> {
     }
 
     /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. The hop must
-    /// meet it in both directions of data, if there are two. If the previous node is a relay, both relays must be in
-    /// order and separated.
+    /// meet it in both directions of data, if there are two. If the previous node is a relay, it must be closer to Tx
+    /// than this relay, and both must be separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -228,15 +228,15 @@ impl<'a> Link<'a> {
         }))
     }
 
-    /// Returns the maximum x of the previous relay in a pass toward Tx, m.
+    /// Returns the maximum x of the previous relay, m, in a pass from Rx to Tx.
     ///
-    /// The relays between it and Rx need no separation in x: they can be above each other.
+    /// The relays between the previous relay and Rx need no separation in x: they can be above each other.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay with the smallest x of this relay among all hops that meet `target`. The
-    /// receiver is at an x from `low` to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop that meets `target` with the smallest possible x of this relay, its sender. The function chooses
+    /// the receiver's x from `low` to `high`, m; in a plain pass this x is `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -259,10 +259,10 @@ impl<'a> Link<'a> {
 
     /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// `reach` is this relay's reach (its x farthest along the pass for the target), and `from_m` the previous relay's.
-    /// `None` if the target cannot be met at any x. Toward Rx, the slack is `reach` plus the maximum length of the last
-    /// hop, minus D. Toward Tx, it is the maximum length of the first hop minus this relay's x, chosen for the largest
-    /// slack.
+    /// `reach` is this relay's reach (its x farthest along the pass for the target), and `from_m` the reach of the
+    /// previous relay. `None` if the target cannot be met at any x. In a pass toward Rx, the slack is `reach` plus the
+    /// maximum length of the last hop, minus the distance from Tx to Rx. In a pass toward Tx, it is the maximum length
+    /// of the first hop minus this relay's x, which is chosen for the largest slack.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -311,9 +311,9 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x, m, at which this relay receives the previous relay of the pass. It is at most `most_m`.
-    /// The previous relay may take any x up to `from_m`, the farthest x at which it meets the target. `None` if there
-    /// is no such x.
+    /// Returns the largest x of this relay, m, at which the hop from the previous relay meets `target`. It is at most
+    /// `most_m`. The previous relay of the pass may take any x up to `from_m`, the farthest x at which it meets the
+    /// target. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -322,8 +322,9 @@ impl<'a> Link<'a> {
     }
 
     /// Returns the chain's slack and this last relay's x, m, for data in both directions. The slack is the maximum
-    /// length of the chain minus D. `hop` leads from Rx to this relay, and `slack` returns the slack toward Rx for an x
-    /// of this relay. The relay's x is less than `reach` if its SIR from Rx would be too low at `reach`.
+    /// length of the chain minus the distance from Tx to Rx. `hop` leads from Rx to this relay, and `slack` returns the
+    /// slack for data toward Rx, for an x of this relay. If the relay's SIR from Rx is too low at `reach`, the function
+    /// searches for a smaller x.
     fn held(
         &self,
         hop: &FromRx,
@@ -354,11 +355,11 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
+    /// Returns the x of the previous relay that `target` requires if this relay is at x = `place`.
     ///
     /// `from_m` is the farthest x of the previous relay that meets `target`. `None` if the previous relay has no
     /// suitable x. The search assumes that its suitable x are one interval without gaps, which is not always true.
-    /// Work: at most two reaches; in an interference field three for each of its points.
+    /// Work: at most two computations of a reach; in an interference field at most three for each point of the field.
     pub fn required_position(
         &self,
         target: f32,
@@ -422,8 +423,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
 }
 
 /// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` has the x
-/// farthest along the pass, m, at which this relay meets each target. `from` has those of the previous relay of the
-/// pass.
+/// farthest along the pass, m, at which this relay meets each target. `from` has the corresponding x of the previous
+/// relay.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -448,11 +449,12 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's slacks, m, one for each of its `targets`.
+    /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's slacks, m, one for each of
+    /// its `targets`.
     ///
-    /// The highest target that the chain meets is committed in two cases. The chain misses the next higher target, and
-    /// their relative difference is within the mission's tolerance; or the ladder has a single target, as in the
-    /// paper's Algorithm 1.
+    /// The chain is committed to the highest target that it meets in two cases: if the ladder has a single target, as
+    /// in the paper's Algorithm 1; or if the chain misses the next higher target, and the relative difference of the
+    /// two targets is within the mission's tolerance.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -480,8 +482,8 @@ impl Verdict {
 }
 
 /// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
-/// is 0 or more. A lower target that is missed counts as well; this can happen in a varying field or at different
-/// altitudes.
+/// is 0 or more. A missed target below the highest met one is also counted. Such a target can occur in a varying field
+/// or at different altitudes.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -489,7 +491,7 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
         .map_or(0, |last| last + 1)
 }
 
-/// Computation of a whole chain for one target, in one program and without messages.
+/// Computation of the x of all relays for one target, in one program and without messages.
 #[derive(Debug)]
 pub struct Walk<'a, F> {
     pub mission: &'a Mission,
@@ -508,7 +510,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns this chain for a plain pass: every relay takes the farthest x that meets the target.
+    /// Returns this computation for a plain pass: every relay takes the farthest x that meets the target.
     pub const fn plainly(&self) -> Self {
         Self::new(self.mission, self.target, true, self.profile_of)
     }
@@ -542,9 +544,9 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if all relays can be at their reaches; otherwise `None`. A reach is the x
-    /// farthest along the pass that meets the target. For `index` 0, the result is an arbitrary number if all relays
-    /// can.
+    /// Returns the reach of relay `index`, m, if every relay can take its reach as its x. Otherwise returns `None`. A
+    /// reach is the x farthest along the pass that meets the target. With `index` 0 the function only checks this
+    /// condition: it then returns an arbitrary number.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -573,8 +575,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take the x that the target requires. For `index`
-    /// 0, the result is an arbitrary number if all relays can.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take the x that the target requires. With `index`
+    /// 0 the function only checks this: it returns an arbitrary number if all relays can take their x.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -596,13 +598,13 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
-    /// x = `place`, m.
+    /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at x
+    /// = `place`, m.
     ///
-    /// `visit` gets a relay's index, its x, and the index of the previous relay of the pass. It returns the previous
-    /// relay's farthest x that meets the target, m; without such a relay, the x at which the pass starts. The result is
-    /// the x required before the first relay; `None` if a relay cannot take the required x, or if `visit` returns
-    /// `None`.
+    /// `visit` gets a relay's index, its x, and the index of the previous relay of the pass. It returns the farthest x
+    /// of the previous relay that meets the target, m; for the first relay of the pass, it returns the x at which the
+    /// pass starts. The function returns the x that is required of the node before the first relay. It returns `None`
+    /// if a relay cannot take the required x, or if `visit` returns `None`.
     pub fn settle(
         &self,
         place: f32,

@@ -10,7 +10,7 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target SIR on which the chain has agreed, and the ladder (list of targets) of the last pass.
+/// Target SIR on which the chain has agreed, and the list of targets of the last pass along the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
@@ -20,7 +20,7 @@ pub struct Agreed {
     pub commit: u8,
     /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
-    /// Target SIR that no chain with the relays' altitudes can meet, linear. `None` with the paper's fixed-step
+    /// Target SIR that no chain whose relays have these altitudes can meet, linear. `None` with the paper's fixed-step
     /// schedule, because its passes do not try all chains. `None` also for data in both directions.
     pub most: Option<f32>,
     /// Number of passes along the chain that the search took.
@@ -125,8 +125,8 @@ impl Planner {
 
 /// Solves the chain in one call. With [`Schedule::Bracketed`], it takes at most about fifty passes over N hops.
 ///
-/// If some relays have to stop before the farthest x that meets the target, the function also checks that they can stop
-/// there.
+/// If the agreed target requires that some relays stop before their farthest x, the function also checks that each of
+/// them can take the required x.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.

@@ -61,11 +61,11 @@ use crate::sir::{Sender, square};
 /// Relative tolerance, for rounding errors, on the maximum squared length of a hop toward Tx.
 const ROUNDING: f32 = 4e-6;
 
-/// Maximum number of f32 steps that shorten a computed hop until it meets its target.
+/// Maximum number of corrections that shorten a computed hop until it meets its target. Each correction is one rounding
+/// step of an f32.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in an interference field, with a receiver at a known position. Its methods compute the sender's x for
-/// a target.
+/// Hop toward Rx in an interference field. Its methods compute the sender's x for a target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
     /// Gain A of the hop, m^2. The hop's SIR is A times `quiet`, divided by the squared length.
@@ -79,15 +79,15 @@ pub struct Retreat<'a> {
     /// Smallest permitted x of this hop's sender, m; Tx is at x = 0.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from this hop's receiver to its sender: gain, and interference at the sender. `None` for data in
-    /// one direction. The gain is for the field's largest Upsilon = E[1/I]. This gain is divided by r, the required
+    /// Gain of the backward hop from this hop's receiver to its sender, and interference at the sender. `None` for data
+    /// in one direction. The gain applies to the field's largest Upsilon = E[1/I]. It is divided by r, the required
     /// ratio of backward to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
 impl<'a> Retreat<'a> {
-    /// Returns the hop from relay `index` to a relay at `altitude_m`, m; with `None` it leads to Rx. `own` has the
-    /// altitude and power of relay `index`.
+    /// Returns the hop from relay `index` to the next relay toward Rx, or to Rx. `altitude_m` is the altitude of the
+    /// receiving relay, m; `None` for Rx. `own` has the altitude and power of relay `index`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb_squared = square(own.cross_section.altitude_m - altitude_m.unwrap_or(0.0));
         let (gain, least_step) = match altitude_m {
@@ -137,8 +137,8 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with a sender at any x down to 0. The hop then leaves no space along x for the relays closer to
-    /// Tx.
+    /// Returns this hop without space along x for the relays closer to Tx than its sender. The sender's x can then be
+    /// as small as 0.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -171,11 +171,12 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x, m, at which this hop's sender receives the backward hop. `None` if there is none.
+    /// Returns the smallest x, m, of this hop's sender at which the backward hop to it meets the target. `None` if
+    /// there is none.
     ///
-    /// The x is at least `place` and below `most_m`. This hop's receiver, at x = `from_m`, sends the backward hop.
-    /// `c` is the gain for the field's largest Upsilon, divided by the target. Work: at most one root for each field
-    /// point from `place` to `from_m`.
+    /// The x is at least `place` and below `most_m`. This hop's receiver, at x = `from_m`, sends the backward hop. `c`
+    /// is the gain of the backward hop for the field's largest Upsilon, divided by the target. Work: at most one root
+    /// for each field point from `place` to `from_m`.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(
         &self,
@@ -228,8 +229,8 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest x of this hop's receiver, m, from which the backward hop meets `target`. This hop's sender
-    /// is at x = `place`, and receives the backward hop. The result is infinite for data in one direction, and
+    /// Returns the largest x of this hop's receiver, m, at which the backward hop from it meets `target`. The backward
+    /// hop leads to this hop's sender, which is at x = `place`. The result is infinite for data in one direction, and
     /// -infinite if no x meets `target`.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
@@ -272,7 +273,7 @@ impl<'a> Retreat<'a> {
     }
 
     /// Returns the longest hop that meets `target`: the smallest x of the sender. `None` if no hop meets it. The
-    /// receiver is at an x from `low` to `high`, m.
+    /// function chooses the receiver's x from `low` to `high`, m.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -287,8 +288,8 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the result for data toward Rx
-    /// only.
+    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the longest hop for data toward
+    /// Rx only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
         &self,
@@ -338,7 +339,7 @@ impl<'a> Retreat<'a> {
     /// the field's largest Upsilon.
     ///
     /// If `best_m` is `None`, only data toward Rx count. Otherwise both directions of data count, and the result must
-    /// be below the value in `best_m`, which it replaces.
+    /// be below the value in `best_m`. The function then stores the result in `best_m`.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -350,7 +351,7 @@ impl<'a> Retreat<'a> {
         Some(from_m)
     }
 
-    /// Returns the hop with the smallest x of its sender, by the search of [`least`] for the receiver's x.
+    /// Returns the hop with the smallest x of its sender. The function [`least`] searches for the receiver's x.
     #[inline(never)] // one copy for data in one and in both directions
     fn searched(
         &self,
@@ -370,8 +371,9 @@ impl<'a> Retreat<'a> {
     /// Returns the receiver's x, m, for each hop that just meets the target in both directions of data. There are at
     /// most two such hops.
     ///
-    /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
-    /// backward gain, each divided by the target.
+    /// The sender is in the part `from` of the field, the receiver in the part `to`. In each part Upsilon, the mean
+    /// inverse interference power, is linear in x. `gains` has the forward and the backward gain, each divided by the
+    /// target.
     fn equal_limits(&self, gains: [f32; 2], from: Piece, to: Piece) -> [Option<f32>; 2] {
         let [c, back] = gains;
         let (rise, back_rise) = (c * to.slope, back * from.slope);
@@ -405,7 +407,7 @@ impl<'a> Retreat<'a> {
     }
 }
 
-/// Hop along the line: the x of its receiver and the x of its sender.
+/// Hop along the line from Tx to Rx: the x of its receiver and the x of its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
     /// x of the receiver of this hop, m; Tx is at x = 0.
@@ -445,7 +447,8 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the part of the field from `start_m`, m, to the next point of the field, at most to `end_m`.
+    /// Returns the part of the interference field between `start_m`, m, and the field's next point in x. The part ends
+    /// at `end_m`, m, if the next point is beyond.
     #[inline(never)] // one copy for all loops
     fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {
@@ -485,8 +488,8 @@ struct Piece {
 /// Returns the hop with the smallest x of its sender, for a receiver's x in [`low`, `high`], m. If several hops are
 /// equally good, the function returns the one with the smallest x of the receiver.
 ///
-/// `value` returns the sender's x, y - sqrt(`c` quiet - s), for the receiver's x, y, and for `quiet`. `quiet` is
-/// Upsilon = E[1/I] at y divided by the field's largest Upsilon. `c` is the sender's gain divided by the target, and s
+/// `value` gets the receiver's x, y, and `quiet`, which is Upsilon = E[1/I] at y divided by the field's largest
+/// Upsilon. It returns the sender's x, y - sqrt(`c` quiet - s). `c` is the sender's gain divided by the target, and s
 /// is the first of `squares`. `value` returns `None` if the square under the root is below the second of `squares`
 /// minus the first. Work: at most three values for each field point from `low` to `high` that a hop could reach.
 pub(super) fn least(

@@ -99,8 +99,8 @@ impl Back {
         })
     }
 
-    /// Returns the target SIR times the squared maximum length of a backward hop to `x_m`, m^2. The product is the same
-    /// for all targets.
+    /// Returns the target SIR times the squared maximum length of a backward hop, m^2. The receiver of the hop is at
+    /// `x_m`. The product does not depend on the target.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -131,18 +131,19 @@ impl Back {
         }
     }
 
-    /// Returns the distance along x from the interferer, m, below which a receiver misses `target`. `None` if it misses
-    /// the target at every distance. The backward hop has the squared length `squared`, m^2.
+    /// Returns the distance along x from the interferer, m, within which a receiver misses `target`. `None` if the
+    /// receiver misses the target at every distance. The backward hop to the receiver has the squared length `squared`,
+    /// m^2.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }
 }
 
-/// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
+/// Returns the distance along x from the interferer, m, within which q is less than `needed`, m^2.
 ///
-/// q = s / (1 + `noise` s) is the inverse of interference plus noise. s is the squared distance from the interferer,
-/// m^2; `aside_squared` is its part perpendicular to x. `None` if q is less than `needed` at any distance, because of
-/// the noise.
+/// q = s / (1 + `noise` s) is the inverse of interference plus noise at a receiver. s is the squared distance from the
+/// interferer to the receiver, m^2; `aside_squared` is its part perpendicular to x. `None` if q is less than `needed`
+/// at any distance, because of the noise.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

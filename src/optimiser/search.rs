@@ -29,12 +29,12 @@ use crate::sir::{self, Sender};
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets per pass along the chain, around the interpolated optimum. The search ends once the optimum is
-    /// known to the mission's tolerance.
+    /// Sixteen targets per pass along the chain, around the optimum interpolated from the last pass. The search ends
+    /// once the optimum is known to the mission's tolerance.
     #[default]
     Bracketed,
-    /// A single target per pass along the chain, falling in equal steps, as in the paper. The first target is the
-    /// upper bound.
+    /// A single target per pass along the chain, falling in equal steps, as in the paper. The first target is the upper
+    /// bound of the chain's SIR.
     FixedStep {
         /// Step epsilon between two targets, linear SIR, above 0. The type is f64, because the step is subtracted up to
         /// ten thousand times from the first target.
@@ -42,7 +42,7 @@ pub enum Schedule {
     },
 }
 
-/// Error: the chain meets no target SIR, not even 1e-12 times the upper bound.
+/// Error: the chain meets no target SIR, not even 1e-12 times the upper bound of its SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Infeasible;
@@ -57,15 +57,16 @@ impl core::error::Error for Infeasible {}
 
 const HIGHEST: f32 = 1e30;
 
-/// Lowest target that the search tries, as a fraction of the upper bound.
+/// Lowest target that the search tries, as a fraction of the upper bound of the chain's SIR.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference between cubic and linear interpolation at which the cubic result is used. The unit is the gap
+/// Maximum difference of the targets by cubic and linear interpolation for use of the cubic one. The unit is the gap
 /// between the two targets around the result.
 const BEND: f32 = 0.25;
 
-/// Maximum ratio of the bracket's width after a pass to its width before. With a larger ratio the next targets are
-/// spread evenly over the bracket (the interval that contains the best target), not around an interpolated optimum.
+/// Maximum ratio of the bracket's width after a pass along the chain to its width before the pass. The bracket is the
+/// interval that contains the best target. With a larger ratio the next targets are spread evenly over the bracket, not
+/// around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
@@ -79,8 +80,7 @@ pub struct Search {
     /// Upper bound of the chain's SIR, linear. This is the maximum SIR of the hop between the leader and the end of the
     /// chain (Tx or Rx) next to it.
     ceiling: f32,
-    /// First target of the fixed-step schedule (gamma_0), or upper bound of the bracketed schedule. The paper defines
-    /// gamma_0.
+    /// First target of the fixed-step schedule (gamma_0 in the paper), or upper bound of the bracketed one.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
@@ -162,8 +162,8 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next list of targets by `ladder`. The leader expects that the pass with these targets ends the
-    /// search. If `ladder` is for a plain pass, all later passes are plain, too.
+    /// Replaces the next list of targets by `ladder`, the leader's prediction. If the prediction is right, the pass
+    /// with these targets ends the search. If `ladder` is for a plain pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
@@ -186,8 +186,9 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues the search after a pass. `slacks` are the chain's slacks, m: for each target that every hop can meet,
-    /// the maximum length minus the distance from Tx to Rx. These targets are the first ones of [`Search::ladder`].
+    /// Continues the search after a pass along the chain. `slacks` are the chain's slacks, m, for the first targets of
+    /// [`Search::ladder`]: those that every hop can meet. A slack is the maximum length of the chain for a target,
+    /// minus the distance from Tx to Rx.
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
@@ -286,8 +287,9 @@ impl Search {
 
 /// Lowers the targets `start` and `met` to allow for data from Rx to Tx, and returns both.
 ///
-/// `start` is the upper bound of the search. It is limited to the maximum SIR of the backward hop to Tx. `met` is a
-/// feasible target. It is lowered until the backward hop to Tx and the backward hop from Rx meet it, too.
+/// `start`, the upper bound of the search, becomes at most the maximum SIR of the backward hop to Tx. `met`, a feasible
+/// target for data toward Rx, becomes at most the SIRs of the backward hops to Tx and from Rx. These SIRs are divided
+/// by the required ratio of backward to forward SIR.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -311,8 +313,9 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
 /// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target). The slack is the maximum
 /// length of the chain minus the distance from Tx to Rx.
 ///
-/// The cubic curve passes through the four points next to the change of sign. `None` if a straight line gives a very
-/// different target: the slack then jumps, and no interpolated target is meaningful.
+/// The cubic curve passes through the slacks of the two highest targets that are met and of the two lowest that are
+/// missed. `None` if linear interpolation gives a target that differs by more than [`BEND`]: the slack then jumps, and
+/// no interpolated target is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -363,8 +366,8 @@ struct StandTrials {
 impl Search {
     /// Returns the target that a relay has refused in the last pass; `None` if there is none.
     ///
-    /// A relay refuses a target if it cannot take the position that the next relay requires. That relay deletes the
-    /// committed target from `verdict`, the result of the pass. The refused target follows from the slacks in
+    /// A relay refuses a target if it cannot take the position that the next relay requires. The refusing relay deletes
+    /// the committed target from `verdict`, the result of the pass. The refused target follows from the slacks in
     /// `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
@@ -390,8 +393,9 @@ impl Search {
 
     /// Continues after a relay refused its required position for `target`.
     ///
-    /// A plain pass first finds a target that no relay can refuse: every relay takes the farthest x that meets it. The
-    /// interval up to the refused target is then bisected. `most` is a target that no chain can meet, if known.
+    /// The search first makes plain passes, in which every relay takes the farthest x that meets a target. So no relay
+    /// can refuse the target that they find. The interval from this target to the refused one is then bisected. `most`
+    /// is a target that no chain can meet, if known.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.
@@ -421,8 +425,8 @@ impl Search {
         Ok(())
     }
 
-    /// Selects the next target of the bisection. Once the interval is small enough, it selects the best accepted
-    /// target, and the search ends.
+    /// Selects the next target of the bisection. Once the interval is within the mission's tolerance, it selects the
+    /// best accepted target, and the search ends.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

@@ -130,13 +130,15 @@ impl Computation {
         Action::Answer { agreed: false }
     }
 
-    /// Returns true until this relay has computed its position by the joint method.
+    /// Returns true while this relay still has to compute the chain's positions by the joint method. The joint method
+    /// optimises x, lateral offset and altitude of all relays together. False while the profiles of some relays are
+    /// missing.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues this relay's joint solution while it waits for the leader's next message.
+    /// Continues the joint solution (positions of all relays) until the leader's next message arrives.
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -161,10 +163,11 @@ impl Computation {
         }
     }
 
-    /// Continues this relay's joint solution of the chain. Returns the predicted target SIR, linear, once the solution
-    /// is complete; `None` before.
+    /// Continues this relay's computation of all relays' positions by the joint method. Returns the predicted target
+    /// SIR of the chain, linear, once the computation is complete; `None` before.
     ///
-    /// If there is no solution, this relay uses its configured lateral offset and altitude, and the target is 0.
+    /// If the joint method finds no positions, this relay uses its configured lateral offset and altitude, and the
+    /// function returns 0.
     #[inline(never)]
     pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
         let mission = context.mission();
@@ -229,9 +232,9 @@ impl Computation {
         });
     }
 
-    /// Starts the search for the highest target SIR at the joint method's lateral offsets and altitudes. The first
-    /// targets are near `target` (linear) if `target` is above 0 and `Settings::predict` is true. Otherwise they are
-    /// those of a search without a prediction.
+    /// Starts the leader's search for the highest target SIR after the joint solution. The relays use the lateral
+    /// offsets and altitudes of this solution. The first targets are near `target` (linear) if `target` is above 0 and
+    /// `Settings::predict` is true. Otherwise they are those of a search without a prediction.
     pub(super) fn search_chosen(
         &mut self,
         context: &Context<'_>,

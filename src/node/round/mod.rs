@@ -56,8 +56,8 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// Creates the state of the agreement on positions at a start. `leads` is true at the leader, which numbers its
-    /// passes along the chain from `number`.
+    /// Creates the state of the agreement on positions when the relay starts. `leads` is true at the leader. The leader
+    /// numbers its messages along the chain (passes) from `number`.
     pub(crate) const fn new(
         leads: bool,
         number: u16,
@@ -141,8 +141,8 @@ impl Round {
         }
     }
 
-    /// Carries out the action `next`, and returns the effects on the other layers. The effects include the sensing
-    /// results that have changed since `before`.
+    /// Carries out the action `next`, and returns the effects on the other parts of the relay. The effects include
+    /// the sensing results that have changed since `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -239,7 +239,7 @@ impl Round {
     }
 
     /// Resets the agreement on positions for a new view at `now`. `leads` is true at the view's leader. `works` is true
-    /// if this relay starts to compute at once, as in the joint method.
+    /// if this relay starts to compute at once, without a message from the leader, as in the joint method.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -247,7 +247,7 @@ impl Round {
         }
     }
 
-    /// Loads a new mission, with `profile` as this relay's profile. The agreed position is kept.
+    /// Loads a new mission, in which this relay has the altitude and power `profile`. The agreed position is kept.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.computation.load(profile);
     }
@@ -366,8 +366,9 @@ const FIELD_HOPS_AT_ONCE: u16 = 8;
 impl Computation {
     /// Continues the computation for the current pass along the chain, or for the leader's next one.
     ///
-    /// Work, at most one of: 12 hops for 16 targets; 128 points of an uneven field, or all its points for one target;
-    /// ten relays of the joint method; 624 positions of Algorithm 2.
+    /// One call does at most one of these: 12 hops for 16 target SIRs; 128 points of an interference field that varies
+    /// along x, or the points for one target if these are more; ten relays of the joint method; 624 positions of
+    /// Algorithm 2.
     fn work(&mut self, context: &Context<'_>) -> Action {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {

@@ -30,7 +30,7 @@ const RAREST: u32 = 64;
 /// Number of sensing passes without a change of the estimate after which their interval doubles.
 const PATIENCE: u8 = 4;
 
-/// Number of sensing passes in each `Listen::every` during the search for a faulty sensor.
+/// Number of sensing passes per interval `Listen::every` during the search for a faulty sensor.
 const TRIALS_A_PERIOD: u64 = 8;
 
 /// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
@@ -42,8 +42,8 @@ impl Computation {
         SENSING && context.settings().listen.is_some() && context.mission().field().is_none()
     }
 
-    /// Returns true if the leader must distribute its interference estimate to all relays. Until then the
-    /// leader starts no different pass (message along the chain).
+    /// Returns true if the leader must distribute its interference estimate to all relays. Until all relays have the
+    /// estimate, the leader starts no other pass (message along the chain).
     pub(super) fn must_distribute(&self, context: &Context<'_>) -> bool {
         Self::is_sensing_enabled(context)
             && context.leads()
@@ -269,7 +269,8 @@ impl Computation {
 
     /// Compares this relay's sensor with the measurements of all other relays.
     ///
-    /// A relay whose measurement is absurd excludes itself. A relay counts as deaf (faulty receiver) if it measures no
+    /// An absurd measurement is far from the estimate and contradicts the other relays' measurements. A relay with such
+    /// a measurement excludes itself from the collection. A relay counts as deaf (faulty receiver) if it measures no
     /// interference where the other relays' measurements predict some. A relay that excluded itself earlier checks
     /// whether its measurements now agree with the others. Finally the relay adds the sums over its measurements to the
     /// sums that travel along the chain, unless it has just excluded itself.

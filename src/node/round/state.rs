@@ -60,7 +60,7 @@ pub(crate) enum Action {
         /// True if the result is the agreement of the chain on its positions.
         agreed: bool,
     },
-    /// Complete the leader's pass along the chain. No further pass starts now.
+    /// End the leader's pass along the chain. The leader has no further pass to start.
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,

@@ -43,8 +43,8 @@ impl Computation {
         )
     }
 
-    /// Starts this relay's computation for several target SIRs. `from` is the previous node's farthest x for each
-    /// target, m, in the direction of the sweep.
+    /// Starts this relay's computation for several target SIRs. `from` has the previous node's farthest possible x for
+    /// each target, m. Farthest means farthest in the direction in which the sweep travels along the chain.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -100,8 +100,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay takes its position for that
-    /// target. If none is, the leader continues its search.
+    /// Handles the result of a sweep of target SIRs. If the result commits the chain to a target, this relay takes its
+    /// position for that target. Otherwise the leader continues its search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;

@@ -15,8 +15,8 @@ use core::task::Poll;
 /// Number of positions that one call of [`Computation::continue_turn`] evaluates in Algorithm 2. In Algorithm 2 the
 /// relays move in turn. The first value is for data from Tx to Rx only, the second for data in both directions.
 ///
-/// A call also completes the current altitude of the search grid: at most 24 more positions, or 194 for data in both
-/// directions.
+/// A call ends only when all positions at the current altitude are evaluated. These can be 24 more positions, or 194
+/// for data in both directions.
 const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 fn neighbour(context: &Context<'_>, place: Placement, power_w: f32) -> HopEnd {

@@ -34,7 +34,8 @@ const MAX_ADVANCE: u32 = 4096;
 /// State of one relay in a view change: the relays' agreement on the members of the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    /// Progress of the view proposal along the chain. Its stage is `Outstanding` while the decision is awaited.
+    /// Transmission state of the view proposal along the chain, and of its reply. Its stage is `Outstanding` while this
+    /// relay awaits the decision.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
@@ -61,7 +62,8 @@ impl ViewChange {
         }
     }
 
-    /// Returns the votes on views to be stored. `base` is the digest of the mission loaded before flight.
+    /// Returns the record of this relay's votes on views, which the firmware stores. `base` is the digest (hash) of the
+    /// mission loaded before flight.
     pub(crate) const fn record(&self, base: u16) -> ViewRecord {
         ViewRecord::new(base, self.electorate)
     }
@@ -71,11 +73,11 @@ impl ViewChange {
         self.proposed.is_none() && self.newest == self.electorate.promised()
     }
 
-    /// Restores the stored votes on views after a start, and requests a view. `untouched` is true if the agreement on
-    /// positions has not started.
+    /// Restores the stored votes on views after a start of the relay, and requests a view. `untouched` is true if the
+    /// agreement on positions has not started.
     ///
-    /// Returns an error if this relay has already started, or had loaded a different mission when the votes were
-    /// stored.
+    /// Returns an error if this relay has already taken part in an agreement, or had loaded a different mission when
+    /// the votes were stored.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -113,8 +115,8 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members of `view` have accepted it. The call has no effect if this relay has accepted a
-    /// different view last.
+    /// Records that all members of `view` have accepted it. The call has no effect unless `view` is the view that this
+    /// relay accepted last.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -215,9 +217,9 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on the proposed `view`, and returns the effects on the other layers. `place` relays have voted before this
-    /// one; their votes are `received`, which is `None` at the proposer. Returns `None` if this relay has already
-    /// promised (Paxos) `view` or a later view.
+    /// Votes on the proposed `view`, and returns the effects on the other parts of the relay. `place` is the number of
+    /// relays that have voted before this one, and `received` has their votes (`None` at the proposer). Returns `None`
+    /// if this relay has already promised (Paxos) `view` or a later view.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -256,11 +258,11 @@ impl ViewChange {
         })
     }
 
-    /// Decides the outstanding view proposal, because this relay is the last one that can be reached. All reachable
-    /// relays have voted on it.
+    /// Decides the outstanding view proposal. Called if this relay is the last one that can be reached, so that all
+    /// reachable relays have voted.
     ///
-    /// If this relay has already forwarded the proposal, it requests a later view instead, because two different views
-    /// with the same identifier could result.
+    /// If this relay has already forwarded the proposal, the next relay may decide on it, too. Two different views
+    /// could then have the same identifier, so this relay requests a later view instead.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
         let Some(proposed) = self.outstanding() else {
             return Effects::NONE;
@@ -424,8 +426,8 @@ impl ViewChange {
         })
     }
 
-    /// Handles the next relay's reply that message `number` is in progress. Returns true if that message is the
-    /// outstanding view proposal.
+    /// Handles the next relay's reply `Busy`: it has no result for message `number` yet. Returns true if that message
+    /// is the outstanding view proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .outstanding()
@@ -500,7 +502,7 @@ impl ViewChange {
     }
 }
 
-/// View proposal that this relay has voted on, with its decision once it is known.
+/// Last view proposal that this relay has voted on, with the decision on it once this is known.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     pub(crate) view: ViewId,
@@ -522,7 +524,7 @@ pub(crate) struct Proposed {
     pub(super) usable_in: u16,
 }
 
-/// Decision of the relays on a proposed view: accepted, or the reason of the refusal.
+/// Decision on a view proposal. `accepted` is the accepted view; `None` if the voters were no quorum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ViewVerdict {
     pub(super) reached: u16,
@@ -535,7 +537,7 @@ pub(super) struct ViewVerdict {
 ///
 /// | situation | wait before the request | set by |
 /// | --- | --- | --- |
-/// | reason for a view | 250 us | `request_now` |
+/// | reason for a new view, such as a changed neighbour | 250 us | `request_now` |
 /// | repetition without a result | 8 hop times at first, each time doubled, at most `probe_after` | `poll_due` |
 /// | refused view | about `probe_after`, doubled with each refusal in a row, at most three times | `request_after_refusal` |
 /// | new reason after a refusal | the rest of the first `probe_after` | `start` |
@@ -550,8 +552,8 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive refusals of view proposals, for lack of a quorum.
     refusals: u8,
-    /// Earliest time of the view request after a refusal, if a new reason for a view arises. A new reason is, for
-    /// example, a changed neighbour. `None` if a new reason has no effect on the time of the request.
+    /// Earliest time of the next view request after a refusal. A new reason for a view, such as a changed neighbour,
+    /// moves the request forward to this time. `None` if a new reason does not change the time of the request.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
@@ -575,8 +577,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, and repeats the request until a view is decided. Each call stands for a new reason, such as a
-    /// changed neighbour. After a refused view the call shortens the wait until the next request.
+    /// Requests a view for a new reason, such as a changed neighbour. The request is repeated until a view is decided.
+    /// If the last proposed view was refused, the call shortens the wait until the next request.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);
@@ -597,7 +599,7 @@ impl ViewRequest {
         self.at = Some(now + PAUSE);
     }
 
-    /// Repeats a pending view request at once. Called when the search for a neighbour has ended.
+    /// Repeats a pending view request at once. Called when the search for a neighbour ended without success.
     pub(crate) fn repeat_now(&mut self, now: Instant) {
         if self.pending {
             self.request_now(now);
@@ -622,12 +624,14 @@ impl ViewRequest {
         self.not_before = None;
     }
 
-    /// Starts the timer for the first message along the chain. If none is received by `at`, a view is requested.
+    /// Starts the timer for the first agreement or view after this relay's start. If this relay has taken part in none
+    /// by `at`, it requests a view.
     pub(crate) const fn await_first(&mut self, at: Instant) {
         self.at = Some(at);
     }
 
-    /// Returns true if the timer of the view request, or of the first message along the chain, has expired.
+    /// Returns true if the timer of the next view request has expired. It also runs while this relay awaits its first
+    /// agreement or view after a start.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.at.is_some_and(|at| at <= now)
     }

@@ -52,12 +52,12 @@ pub(super) const VOTES: usize = 8;
 pub(crate) struct Electorate {
     /// Newest view that is known to be agreed on.
     pub(super) agreed: View,
-    /// True if this relay is a member of the view `agreed`, so that its vote counts.
+    /// True if this relay is a member of the view `agreed`. Only a member's vote counts for the next view.
     pub(super) member: bool,
     pub(super) promised: ViewId,
     /// View that this relay has accepted, and that is not yet known to be agreed on. `None` if there is none.
     pub(super) accepted: Option<Successor>,
-    /// Proposals that this relay has voted on and that can still become views, latest first.
+    /// Proposals that this relay has voted on and that can still become agreed views, latest first.
     pub(super) voted: [ViewId; VOTES],
     /// Node number of the leader before any view change. If the initial view splits into two halves, the half with this
     /// node has the quorum.
@@ -93,8 +93,8 @@ impl Electorate {
     /// Votes on the view `proposal`, and returns the votes so far. `None` if this relay has already promised `proposal`
     /// or a later view.
     ///
-    /// `received` has the votes of earlier relays; `None` at the proposer. `other_leases` are the remaining times of
-    /// other relays' leases.
+    /// `received` has the votes of the relays that voted before this one; `None` at the proposer. `other_leases` has
+    /// the remaining times of the other relays' leases.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -142,8 +142,8 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of node `node` alone is not enough for a quorum on `proposal`. The call itself records
-    /// no vote.
+    /// Returns true if `proposal` has no quorum with the vote of node `node` alone. The call computes this vote, but
+    /// does not record it.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -156,8 +156,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view `proposal`. If the list is full, the earliest four and the latest four votes
-    /// remain, including the new one.
+    /// Records the vote on the view `proposal`. If the list of eight votes is full, the four earliest votes and the
+    /// four latest ones, including the new vote, remain.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -186,7 +186,7 @@ impl Electorate {
     }
 
     /// Accepts the decision on `proposal`; returns false if this relay has promised a later proposal. `view` is the
-    /// decided view, which replaces `base`; `None` for a refusal.
+    /// decided view; `None` for a refusal. `base` is the agreed view that the decided view replaces.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -218,16 +218,16 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. The time is at most `most`; if
-/// it is unknown, it is `most`.
+/// Returns the waiting time before relays may use positions of the next view, in tenths of a second. It is the
+/// remaining time of the leases stated in the votes `poll`, at most `most`. If it is unknown, it is `most`.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
     poll.earlier_lease_left.max(lease_left).min(most)
 }
 
-/// Returns the view decided on `proposal` with the votes `poll`; `None` without a quorum. The proposal has reached
-/// `relays` out of the `all` relays of the mission.
+/// Returns the view decided on `proposal` with the votes `poll`; `None` without a quorum. `relays` is the number of
+/// relays that the proposal has reached, and `all` the number of relays in the mission.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,

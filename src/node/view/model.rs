@@ -45,10 +45,10 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
-/// Checks the view change for every order of events in a chain of `relays` relays. The numbers of link cuts,
+/// Checks the view-change protocol for every order of events in a chain of `relays` relays. The numbers of link cuts,
 /// proposals and reboots are limited.
 ///
-/// If `heals` is true, the check in every state also includes that the chain agrees on a view once all links are
+/// If `heals` is true, the function also checks in every state that the chain agrees on a view once all links are
 /// restored.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
@@ -68,7 +68,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Checks that the views form one sequence when a spare joins and a relay leaves.
+/// Checks that each agreed view replaces the one before when a spare joins and a relay leaves.
 #[test]
 fn departures_and_joins_keep_one_sequence_of_views() {
     for (relays, outside, (cuts, proposals, reboots, moves)) in [
@@ -90,8 +90,8 @@ fn departures_and_joins_keep_one_sequence_of_views() {
     }
 }
 
-/// Checks that the model check finds a wrong rule for departures. By this rule a departure reduces the quorum before
-/// the chain has agreed on it.
+/// Checks that the model check finds a wrong rule for departures. By this rule a relay that leaves no longer counts for
+/// the quorum, although the chain has not agreed on its departure yet.
 #[test]
 fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     let check = Check {
@@ -104,7 +104,7 @@ fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     assert_eq!(found.what, ONE_CHAIN, "{}", found.how);
 }
 
-/// Model check of the view change with more events; takes some minutes.
+/// Model check of the view change with more events than the tests above; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {
@@ -173,7 +173,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
-    /// Last accepted view, the relay's rank in it, and its number of members.
+    /// Last view that this relay accepted: its identifier, the relay's rank, and the number of members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -349,8 +349,8 @@ pub(super) enum Rule {
     Members,
     /// Broken rule, for a test: a departure reduces the quorum at all other relays at once.
     Inside,
-    /// Broken rule, for a test: every reachable relay votes. The quorum is that of the newest view that any of them
-    /// knows.
+    /// Broken rule, for a test: every reachable relay votes. The quorum is that of the newest view that any reachable
+    /// relay knows.
     Everybody,
 }
 
@@ -441,7 +441,8 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// Sends the pending messages of relay `at` into the air. Records the decision in `effects`, if any.
+    /// Adds the pending messages of the relay with list index `at` to the frames in transit. Records the decision in
+    /// `effects`, if any.
     pub(super) fn apply_effects(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
@@ -567,7 +568,7 @@ impl Check {
         }
     }
 
-    /// Moves relay `at` out of the chain, as `Node::go_outside` does, or back into the chain.
+    /// Makes the relay with list index `at` leave the chain, as `Node::go_outside` does, or join it again.
     fn move_relay(&self, chain: &mut Chain, at: usize) {
         chain.outside ^= 1 << at;
         let change = &mut chain.relays[at].change;
@@ -594,7 +595,7 @@ impl Check {
 
 impl Check {
     /// Returns true if the agreed views form one sequence. Each agreed view must replace the initial view or an earlier
-    /// agreed view, and no two may replace the same view.
+    /// agreed view, and no two agreed views may replace the same view.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {
             let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
@@ -619,9 +620,9 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if every view that a relay knows as agreed on is in the list of agreed views. Such a view must also
-    /// have at most as many voting members as it has relays. A voting member has a vote in this view, and knows no
-    /// newer agreed view.
+    /// Returns true if the newest agreed view that each relay knows meets two conditions. The view is the initial one,
+    /// or is in the list of agreed views. And the relays that have a vote in this view, and know no newer one, are not
+    /// more than its members.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {
@@ -641,7 +642,7 @@ impl Check {
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {
-    /// Delivers all frames between the relays in the bit mask `there` until nothing changes any more.
+    /// Delivers all frames between the relays in the bit mask `there`, until the state no longer changes.
     pub(super) fn drain(&self, chain: &mut Chain, there: u8) {
         loop {
             let before = chain.clone();
@@ -659,8 +660,8 @@ impl Check {
         }
     }
 
-    /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. The relays
-    /// must also be a quorum of every view that was decided later.
+    /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. They must
+    /// also be a quorum of every later view that was ever decided on.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.relays.len()).filter(known);
@@ -677,7 +678,7 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals until the relays in the bit mask `there` agree on a view.
+    /// Returns the number of proposals that the relays in the bit mask `there` need to agree on a view.
     ///
     /// The members of the view must be exactly these relays. Only the links between them work. If `keeps_air` is true,
     /// frames in transit are still delivered; otherwise they are lost. Returns `Some(0)` if the relays are no quorum,

@@ -5,7 +5,7 @@ use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::message::Successor;
 
-/// Version of the stored record's format, in its first byte.
+/// Version of the stored record's format. The version is the first byte of a record.
 const FORMAT: u32 = 1;
 
 /// Votes on views, which must survive a reboot in flight.
@@ -43,8 +43,8 @@ error_texts!(RecordError {
     Begun => "the record of votes must be restored before the relay starts",
 });
 
-/// Writer of numbers of one, two or four bytes, least significant byte first. This writer needs a third of the flash
-/// that an iterator over all bytes would need.
+/// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash memory of
+/// an encoder with an iterator over all bytes.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 

@@ -17,8 +17,8 @@ pub(super) fn id(number: u32, node: u32) -> ViewId {
     ViewId::from_bits(number << 10 | node)
 }
 
-/// Relay under test, in a chain of four. The relay has stored a mission of version 4, but flies the mission loaded
-/// before flight.
+/// Relay under test, in a chain of four. It flies the mission loaded before flight, but has stored a different mission
+/// with the version 4.
 pub(super) struct Relay {
     pub(super) member: Member,
     pub(super) latest: MissionId,
@@ -192,9 +192,9 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// Checks that a second proposal of the same view, but with a different mission, is no duplicate.
+/// Checks that a second proposal of a view, with a different mission, is not treated as a duplicate.
 ///
-/// Between the two proposals the leader has restarted and received that mission.
+/// Between the two proposals the leader has restarted and received the different mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -305,8 +305,8 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Checks that a refusal names the agreed view, so that relays near the leader learn of it. Otherwise the proposals of
-/// these relays would be refused for ever.
+/// Checks that the refusal of a proposal states the newest agreed view. From it the relays near the leader learn of
+/// this view. Otherwise all their proposals would be refused.
 #[test]
 fn a_refusal_names_the_agreed_view() {
     let view = View {
@@ -458,8 +458,8 @@ fn a_forwarded_proposal_without_a_next_relay_is_abandoned() {
 
 /// Checks that a relay forwards a view proposal to one node only.
 ///
-/// Otherwise two views could have the same identifier if only relay 1 has lost relay 2: one with the members 1 to 3,
-/// and one with 1 and 4.
+/// Otherwise two views could have the same identifier if relay 1 loses the link to relay 2: one view with the members 1
+/// to 3, and one with 1 and 4.
 #[test]
 fn a_proposal_is_forwarded_to_only_one_node() {
     let mut relay = Relay::new(1);

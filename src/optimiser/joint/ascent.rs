@@ -7,15 +7,16 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed moves. An iteration tries them in this order until the chain improves.
+/// Fractions of the moves that the backward pass computes for the relays. An iteration tries these fractions in this
+/// order until one improves the chain.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. The trust also
-/// limits the change of ln(target SIR).
+/// First value of the *trust*, which limits the changes of a chain in one iteration. Each relay moves by at most the
+/// trust times its distance to the interferer, and ln(target SIR) changes by at most the trust.
 const TRUST: f32 = 0.5;
 
-/// Minimum trust (limit of the relays' moves) at which the result of an improvement is predicted. The result is the
-/// chain's target. With a smaller trust the predicted target would be too low.
+/// Minimum trust (limit of the relays' moves) at which the final target of a chain is predicted. With a smaller trust
+/// the predicted target would be too low.
 const RESTRAINED: f32 = 0.05;
 
 /// Trust (limit of the relays' moves) below which the improvement of a chain is given up.
@@ -25,8 +26,8 @@ const LEAST_TRUST: f32 = 1e-4;
 /// Rx. The usual length is 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the upper limit on the target SIR, in ln(SIR). The limit is raised if the chain meets the limit,
-/// but its SIR does not reach the upper bound on the SIR of any chain.
+/// First increase of the upper limit on a chain's target SIR, in ln(SIR). The limit is raised if the chain meets this
+/// target, but does not reach the upper bound on the SIR of all chains.
 const EXCESS: f32 = 0.03;
 
 /// First upper limit on the slack, the length by which a chain reaches beyond Rx. The unit is the distance from Tx to
@@ -43,26 +44,25 @@ const SHORT: f32 = 2.0;
 /// improvement.
 const CLOSE: f32 = 3e-6;
 
-/// Expected increase of ln(target SIR) below which the improvement of a chain ends.
+/// Expected increase of ln(target SIR) by the next moves, below which a chain's improvement ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of ln(target SIR) below which the result of an improvement can be predicted. The result is the
-/// chain's target SIR.
+/// Expected increase of ln(target SIR) by the next moves, below which the final target is predicted.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which a chain that falls far short of Rx counts as diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Maximum distance from the chain's end to Rx at which a chain that is too short is improved again. The unit is the
-/// distance from Tx to Rx.
+/// Maximum distance by which a chain may end before Rx, if its improvement is to be repeated. The repetition has a
+/// lower upper limit on the slack (length by which a chain reaches beyond Rx). The unit is the distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
-    /// Try the fraction `share` of the relays' computed moves, with the target `sigma` = ln(SIR).
+    /// Try the fraction `share` of the moves from the backward pass, with the target `sigma` = ln(SIR).
     Try { share: f32, sigma: f32 },
     /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
@@ -81,8 +81,8 @@ pub(crate) struct Ascent {
     /// chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target, in ln(SIR), at which the chain is compared with the upper bound on any chain's SIR. This target is
-    /// raised if the chain does not reach the bound.
+    /// Upper limit on the target, in ln(SIR). A chain that reaches this limit is compared with the upper bound on the
+    /// SIR of all chains. If the chain does not reach this bound, the limit is raised.
     pub(crate) limit: f32,
     /// Next increase of `limit`, in ln(SIR).
     excess: f32,
@@ -103,7 +103,7 @@ pub(crate) struct Ascent {
 }
 
 impl Ascent {
-    /// Empty state before the first improvement of a chain: all its bytes are 0.
+    /// State before the first improvement of a chain. All its bytes are 0.
     pub(crate) const NONE: Self = Self {
         spare: 0.0,
         limit: 0.0,
@@ -195,8 +195,8 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. The sums are the
-    /// length that the relays' moves are expected to add beyond Rx (slack), and the change of slack per unit of
+    /// Adds the backward pass's results for one segment (ten relays) to the sums over the chain. The results are the
+    /// length that the relays' moves are expected to add beyond Rx (slack), and the change of the slack per unit of
     /// ln(target SIR).
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
@@ -225,8 +225,8 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if the slack and the expected gain of the moves are small. Each of them must change ln(target SIR)
-    /// by less than `by`.
+    /// Returns true if the slack and its expected increase by the relays' moves are both small. Small means that each
+    /// of them is worth less than `by` in ln(target SIR).
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -243,8 +243,8 @@ impl Ascent {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the improvement of this chain is predicted to end at or below `sigma`, in ln(SIR). `turn` is the
-    /// next action of the improvement. False if no prediction is possible.
+    /// Returns true if this chain's improvement is predicted to end at a target of at most `sigma`. `sigma` is in
+    /// ln(SIR), and `turn` is the next action of the improvement. False also if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -275,8 +275,8 @@ impl Ascent {
         }
     }
 
-    /// Returns the merit of a chain: the target, as ln(SIR), at which the chain would just reach Rx. `slack` is the chain's slack at the
-    /// target `sigma`, m. A negative slack counts twice.
+    /// Returns the merit of a chain: the target, as ln(SIR), at which the chain would just reach Rx. `slack` is the
+    /// length by which the chain reaches beyond Rx at the target `sigma`, m. A negative `slack` is doubled.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
@@ -326,8 +326,8 @@ impl Ascent {
         }
     }
 
-    /// Returns the next action after the target of the unchanged chain was raised to `sigma`, in ln(SIR). `slack` is
-    /// the length by which the chain reaches beyond Rx at this target, m.
+    /// Returns the next action after the search has found the highest target of the unchanged chain. `sigma` is this
+    /// target, in ln(SIR), and `slack` the length by which the chain reaches beyond Rx at this target, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

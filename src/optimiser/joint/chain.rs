@@ -54,10 +54,10 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, at which the relays toward Rx still fit with their separation.
+    /// Returns the largest x of a relay, m, that leaves the relays toward Rx space for their separation.
     ///
-    /// `end_m` is the largest x of the next relay toward Tx, m, and `step` the minimum difference in x from that relay,
-    /// m.
+    /// `end_m` is the same limit for the previous relay (toward Tx), m, and `step` the minimum difference in x between
+    /// these two relays, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
@@ -91,8 +91,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the fixed altitude of relay `index`, m. `None` if the relay chooses its altitude itself, or if the
-    /// mission has a single altitude for all relays.
+    /// Returns the fixed altitude of relay `index`, m. `None` if the joint method chooses the altitude of this relay,
+    /// or if the mission has a single altitude for all relays.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -129,10 +129,9 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the chain for `target`, m, and the derivatives of the slack. The derivatives are by the
-    /// last relay's position `at`.
+    /// Returns the chain's slack for `target`, m, with its derivatives by the last relay's position `at`.
     ///
-    /// The slack is the maximum length of the last hop for `target`, minus the length of this hop.
+    /// The slack is the maximum length of the last hop for `target`, minus the length of the hop from `at` to Rx.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = self.seat(self.relays());
         let most = site::last_most(self.mission, power_w, room);
@@ -155,7 +154,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 
     /// Returns the lowest target, in ln(SIR), at which every hop has a finite maximum length. This target is just above
-    /// the largest gain of a hop. At a lower target, a hop that starts beyond the interferer could have any length.
+    /// the largest gain of a hop. At a lower target, the maximum length of a hop that starts beyond the interferer
+    /// could be infinite.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -214,7 +214,8 @@ impl Gains {
     }
 
     /// Returns the gains of hop `k` for data toward Rx and toward Tx. `k` is 1 (hop from Tx) to N + 1 (hop to Rx), and
-    /// `relays` is N. `sent_by` converts a gain to that for the transmit power of the relay with the given index.
+    /// `relays` is N. `sent_by` gets a gain and the index of the sending relay, and returns the gain for that relay's
+    /// transmit power.
     pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
         let there = match k {
             1 => self.from_tx,
@@ -230,8 +231,8 @@ impl Gains {
     }
 }
 
-/// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. The function compares
-/// the limits of `room`, and the lateral offset 0.
+/// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. The function tries the
+/// lowest and the highest altitude in `room`, each with three lateral offsets: the two limits in `room`, and 0.
 pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());

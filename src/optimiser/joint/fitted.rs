@@ -33,7 +33,7 @@ const STATES: usize = 5;
 /// Moves of a relay that are tried in each pass over the relays, in units of the current step width. If two moves are
 /// equally good, the one listed first is used.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits that store one choice among the five tried positions of the next relay toward Tx.
+/// Number of bits of one choice in `Fitted::choices`. A choice is an index in [`MOVES`].
 const BITS: usize = 3;
 
 /// Smallest width of a relay's moves, divided by the distance from Tx to Rx. Below it, the search goes on to the next
@@ -55,8 +55,8 @@ const OTHERS_AT_ONCE: u16 = 10;
 const SHORTEST: f32 = 1e-12;
 
 /// Initial chains: two ends of an interval of x, and the first step width. The unit is the distance from Tx to Rx. The
-/// relays are evenly spaced between the ends. If the ends are equal, the relays start in a row around this x, at their
-/// minimum separation.
+/// relays are evenly spaced between the ends. If the ends are equal, the relays are grouped around this x, each at the
+/// minimum separation from the next.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -67,23 +67,24 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Index, from 0, of the initial chain that is the best result of all searches along x alone. Used only if the mission
+/// Index, from 0, of the initial chain that is the best chain found by moves along x alone. Used only if the mission
 /// allows several lateral offsets or altitudes.
 const BEST: u8 = 8;
 /// First step width of the moves from initial chain [`BEST`], divided by the distance from Tx to Rx.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
 /// Lateral offset and altitude of further initial chains, as fractions of their ranges. The lateral offset ranges from
-/// 0 to its limit on the side without the interferer. The altitude ranges from the mission's common altitude to the
-/// highest altitude.
+/// 0 to its limit on the side of the line Tx-Rx opposite the interferer. The altitude ranges from the mission's common
+/// altitude to the highest altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Fitted slots of the hops next to a relay: begin and end of each, as fractions of the frame, 0 to 1.
+/// Time slots of the hops to and from a relay, each as long as its hop needs (fitted slots). A slot has a begin and an
+/// end, as fractions of the frame, 0 to 1.
 ///
-/// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
+/// The slots of all hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
 /// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
-/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio the
-/// length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about 6e-8,
-/// so a shorter slot can become empty.
+/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. A radio also
+/// needs the length of the frame, and a clock that all nodes share. The numbers are multiples of about 6e-8, so a
+/// shorter slot can become empty.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
@@ -193,11 +194,12 @@ pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. At the end of the search, each relay's x and y are replaced by total hop times from
-    /// Tx to the relay: x by the total time toward Rx, and y by the total time toward Tx.
+    /// Positions of the relays in the best chain, in units of the distance from Tx to Rx. After the search, the times
+    /// of all hops from Tx to each relay are stored here instead: the time toward Rx in place of x, and the time toward
+    /// Tx in place of y.
     best_places: [Triple; RELAYS],
-    /// Choices for each relay: the best position of the next relay toward Tx for each of five positions. A choice is an
-    /// index in [`MOVES`], and takes three bits.
+    /// For each of a relay's five tried positions: the best choice among those of the previous relay. The previous
+    /// relay is the one toward Tx. A choice is an index in [`MOVES`], and takes three bits.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
@@ -214,13 +216,13 @@ pub(super) struct Fitted<const RELAYS: usize> {
     before: f32,
     /// Total hop time of the best chain found; 0 until a chain is found.
     best: f32,
-    /// Sum of all hop times of the solved chain, toward Rx and back to Tx.
+    /// Sum of all hop times of the solved chain for data toward Rx, and the sum for data toward Tx.
     sums: [f32; 2],
     worst: f32,
 }
 
 impl<const RELAYS: usize> Fitted<RELAYS> {
-    /// State of the solver before its first call. All its bytes are 0, so it takes no flash.
+    /// State of the solver before its first call. All its bytes are 0, so that it needs no flash memory.
     pub(super) const NEW: Self = Self {
         gains: Gains::NONE,
         places: [[0.0; 3]; RELAYS],
@@ -275,8 +277,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    /// Moves relays to their positions in the current initial chain. One call moves up to [`OTHERS_AT_ONCE`] relays;
-    /// the first `done` relays are already moved. After the last relay, the first pass over the chain begins.
+    /// Moves relays to their positions in the current initial chain. `done` is the number of relays moved by earlier
+    /// calls. One call moves up to [`OTHERS_AT_ONCE`] relays. After the last relay, the first pass over the chain
+    /// begins.
     fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
         let relays = chain.relays();
@@ -330,8 +333,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns the position of node `index`, moved by `by` along the current coordinate. The result stays within the
-    /// limits of this coordinate. Index 0 is Tx, and N + 1 is Rx.
+    /// Returns the position of node `index`, moved by `by` along the coordinate of the current pass. The result stays
+    /// within the limits of this coordinate. Index 0 is Tx, and N + 1 is Rx; both do not move.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));

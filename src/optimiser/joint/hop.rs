@@ -42,10 +42,10 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of a hop's end position, for a hop that just meets its target SIR.
+/// Derivatives of the end point of a hop that just meets its target SIR.
 ///
-/// Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w, of the hop's start
-/// p, and of the target SIR.
+/// One coordinate of the end point is dependent: it follows from the two free coordinates w_1 and w_2 of the end point,
+/// from the start point p of the hop, and from the target SIR.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -55,15 +55,16 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the dependent coordinate of the hop's end by w and p. w are the two free coordinates of
-    /// the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value for each coordinate
-    /// of p.
+    /// Second derivatives of the dependent coordinate of the hop's end by w_i and by p.
+    ///
+    /// w_1 and w_2 are the two free coordinates of the end, and p is the start of the hop. Row i is for w_i, and has
+    /// one value for each coordinate of p.
     pub(super) by_wp: [Triple; 2],
     /// Second derivatives of the dependent coordinate of the hop's end. The derivatives are by the two free coordinates
     /// w_1 and w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m. The two free coordinates are
-    /// constant.
+    /// Derivative of the dependent coordinate of the hop's end with respect to ln(target SIR), m. The two free
+    /// coordinates of the end are kept constant.
     pub(super) by_target: f32,
 }
 
@@ -81,9 +82,9 @@ impl Reach {
 
     /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`.
     ///
-    /// In all three points the dependent coordinate of the hop's end comes first. `c` is the target SIR divided by the
-    /// gain. `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. If no coordinate of the
-    /// hop's end depends smoothly on the others, the result is [`Reach::FIXED`].
+    /// In all three points the first coordinate is the dependent one: at the hop's end it is computed from the other
+    /// two. `c` is the target SIR divided by the gain. `noise` is the noise divided by the interferer's power received
+    /// at 1 m, 1/m^2. If the dependent coordinate has no finite derivatives, the result is [`Reach::FIXED`].
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -216,14 +217,14 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition s + `spare` >= `c` l for a hop to meet its target SIR. The squared distance from the hop's receiver to the
-/// interferer is s, m^2, and the squared hop length is l, m^2. `c` is the target divided by the gain. Noise makes `c`
-/// larger, and the constant `spare` larger than 0.
+/// Condition s + `spare` >= `c` l, under which a hop meets its target SIR.
+///
+/// s is the squared distance from the hop's receiver to the interferer, m^2, and l is the squared hop length, m^2.
+/// Without noise, `c` is the target divided by the gain, and `spare` is 0. With noise both are larger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
-    /// Difference `c` - 1, computed without cancellation. `c` is the target SIR divided by the gain, increased by
-    /// noise.
+    /// Difference `c` - 1, computed without cancellation, for the condition s + `spare` >= `c` l.
     pub(super) e: f32,
     /// Constant in the condition s + `spare` >= `c` l of [`Tangent`], m^2; 0 without noise.
     pub(super) spare: f32,
@@ -234,11 +235,11 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is the squared distance
-    /// from the hop's receiver to the interferer, m^2.
+    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is a squared distance
+    /// from the hop's receiver to the interferer, m^2; at this distance the linearised condition is exact.
     ///
-    /// `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. `c` is the target SIR divided
-    /// by the gain, and `e` is c - 1.
+    /// `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. `c` is the target SIR divided by
+    /// the gain, and `e` is c - 1.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

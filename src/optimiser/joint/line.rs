@@ -15,11 +15,11 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use core::task::Poll;
 
-/// Number of relays per call: for data in one direction, and for data in both directions.
+/// Number of relays that one call handles: for data in one direction, and for both directions.
 const AT_ONCE: [u16; 2] = [20, 2];
 
-/// Memory of a relay during Algorithm 1, the computation of all x for one target. It has the relay's x, and the upper
-/// limit of this x, m.
+/// Memory of Algorithm 1 for one relay: the relay's x, and the upper limit of this x, m. Algorithm 1 computes the x of
+/// all relays for one target.
 pub(super) trait Noted {
     fn lengths_m(&mut self) -> &mut [f32; 2];
 }
@@ -183,8 +183,8 @@ fn hop<const RELAYS: usize>(
 }
 
 /// Returns the chain's slack, m, and the final x of the last relay, m. The slack is the length by which the chain
-/// overshoots Rx. `[from_m, reach_m]` are the farthest x of the last two relays, m, and `end_m` is the upper limit of
-/// the last relay's x.
+/// overshoots Rx. `from_m` and `reach_m` are the farthest x of the second-last relay and of the last relay, m. `end_m`
+/// is the upper limit of the last relay's x.
 fn ending<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,

@@ -23,8 +23,8 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack, by which the chain overshoots Rx, with respect to ln(target SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of the predicted increase of the chain's slack, a f + b f^2, m. The fraction f, 0 to 1, is the
-    /// part of their computed moves that this relay and all relays toward Rx make.
+    /// Coefficient a of the predicted increase of the chain's slack, a f + b f^2, m. This relay and all relays toward
+    /// Rx make the fraction f, 0 to 1, of their computed moves.
     pub(crate) linear: f32,
     /// Coefficient b of the predicted increase of the chain's slack, a f + b f^2, m; see `linear`.
     pub(crate) square: f32,
@@ -73,9 +73,10 @@ impl Outlook {
         }
     }
 
-    /// Replaces a hop receiver's value function by that of the hop's sender; returns the receiver's policy. The policy
-    /// is a move in two coordinates from the present position, within [`low`, `high`], m. The third coordinate, `axis`,
-    /// follows from the hop's maximum length.
+    /// Replaces the value function of a hop's receiver by that of its sender; returns the policy. The value function is
+    /// the chain's slack, which depends on the position of the node. The policy is the receiver's move from its present
+    /// position in two coordinates, within [`low`, `high`], m. The third coordinate, `axis`, follows from the hop's
+    /// maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -175,9 +176,10 @@ pub(crate) struct Policy {
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// Returns the policy that maximises a quadratic function of the relay's two free coordinates. The relay's move
-    /// is within [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh,
-    /// hh), which are made concave. `across` has the mixed derivatives with respect to the sending relay's position.
+    /// Returns the policy that maximises a quadratic function of the relay's two free coordinates. The relay's move is
+    /// within [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh, hh);
+    /// positive curvature is made negative. `across` has the mixed derivatives with respect to the sending relay's
+    /// position.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],
@@ -239,8 +241,8 @@ impl Policy {
 
     /// Returns the relay's move in its two free coordinates, m. The third coordinate follows from the hop.
     ///
-    /// The move is `share` times the relay's `step`, plus the reaction to `change`, the move of the sender in x, y and
-    /// h, m.
+    /// The move is `share` times the relay's `step`, plus the relay's response to `change`. `change` is the move of the
+    /// hop's sender in x, y and h, m.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;

@@ -13,7 +13,8 @@ use crate::place::{CrossSection, Placement};
 use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
-/// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
+/// Fraction of a hop's squared maximum length that the joint method uses. The unused 1e-5 is a margin for rounding
+/// errors.
 const RIM: f32 = 0.999_99;
 
 /// Factor on the minimum separation in the joint method. It is a margin, so that rounding errors do not bring relays
@@ -24,7 +25,8 @@ pub(super) const MARGIN: f32 = 1.0005;
 /// result of the previous step (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Number of bisection steps of [`Site::halved`], which finds the farthest point that a hop reaches.
+/// Number of bisection steps of [`Site::halved`]. This function searches along a line for the farthest
+/// position at which a hop meets its target.
 const HALVINGS: u8 = 12;
 
 /// Relay to be placed by the joint method, with the sender of the hop to it.
@@ -97,12 +99,13 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
+    /// Returns the lateral offset and altitude closest to `wanted` at which the hop can meet `target`.
     ///
-    /// The x of the hop's end must not be smaller than the x of the sender. The search goes along a straight line to
-    /// `wanted`. It starts at the permitted position closest to the middle of the reachable positions. `None` if the
-    /// hop reaches no permitted position. With the sender at p, the interferer at m and c = target / gain > 1 the
-    /// reachable positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// The x of the hop's end must not be smaller than the x of the sender. If the hop cannot reach `wanted`, the
+    /// search goes along a straight line to `wanted`. The line starts at the permitted position closest to the centre
+    /// of all positions that the hop can reach. `None` if the hop reaches no permitted position. With the sender at p,
+    /// the interferer at m and c = target / gain > 1 the reachable positions form a ball: its centre is p + (p - m) /
+    /// (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -115,9 +118,9 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is its centre
-    /// and squared radius, m^2. `None` if c = target / gain is at most 1: the hop then reaches any lateral offset and
-    /// altitude.
+    /// Returns the circle of lateral offsets and altitudes at which the hop can meet `target`. The x of the hop's end
+    /// is at least `x_m`. The result is the circle's centre and squared radius, m^2. `None` if c = target / gain is at
+    /// most 1: the hop then reaches any lateral offset and altitude.
     fn disk(
         &self,
         target: f32,
@@ -168,8 +171,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest position that the hop reaches on the way to `wanted`, found by bisection. The way is a
-    /// straight line in lateral offset and altitude, from the sender's lateral offset and altitude.
+    /// Returns the position nearest to `wanted` at which the hop meets `target`, found by bisection. The bisection goes
+    /// along a straight line in lateral offset and altitude, from the sender's lateral offset and altitude to `wanted`.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -187,8 +190,8 @@ impl<'a> Site<'a> {
 
     /// Returns the relay's new lateral offset and altitude after a fraction of its computed move.
     ///
-    /// `policy` gives the move, and `share` the fraction. The sender has already moved by `change` to `from`; the relay
-    /// has not moved yet and is at `nominal`. The hop has to meet `target`.
+    /// `policy` gives the move, and `share` the fraction. `from` is the sender's position after its move by `change`,
+    /// and `nominal` the relay's position before its move. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -406,7 +409,7 @@ impl Room {
         }
     }
 
-    /// Returns these lateral offsets with `altitude_m` as the only allowed altitude.
+    /// Returns the same lateral offsets, with `altitude_m` as the only allowed altitude.
     pub const fn at_altitude(self, altitude_m: f32) -> Self {
         Self {
             band: Band::at(altitude_m),
@@ -433,8 +436,8 @@ impl Room {
     }
 }
 
-/// Factor on the maximum SIR of the first or the last hop, for the upper bound of the chain's SIR. At the maximum
-/// itself, the first and the last relay would have no choice of position.
+/// Factor on the maximum SIR of the first or the last hop, for the upper bound of the chain's SIR. At exactly this
+/// maximum, the first or the last relay could be at a single position only.
 const LITTLE: f32 = 0.999_97;
 
 /// Number of bisection steps for the position with the largest SIR of a first hop with noise.
@@ -481,16 +484,16 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Weight of the penalty for a violated minimum separation, in units of the distance from Tx to Rx. The weight is so
-/// large that a violation never improves a chain.
+/// Weight of the penalty for a hop that is shorter than the minimum separation of two relays. The unit is the distance
+/// from Tx to Rx. The weight is so large that such a hop never improves a chain.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from a limit of a coordinate's range, within which the relay counts as at the limit. The unit is the
+/// Maximum distance from a limit of a coordinate at which a relay counts as being at this limit. The unit is the
 /// distance from Tx to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative margin of a hop to its target, up to which the hop counts as one of maximum length. Used for hops that end
-/// at the x of Rx. A hop with a larger margin does not restrict the move of its receiver.
+/// Relative margin to its target, up to which a hop that ends at the x of Rx has maximum length. A hop with a larger
+/// margin counts as shorter than its maximum, and does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
@@ -585,9 +588,10 @@ impl Site<'_> {
 
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// It is the coordinate with the largest derivative of F among those that are not at a limit, `low` or `high`; x is
-    /// preferred. F is half the margin of the hop to its target: 0 for a hop of maximum length (see `hop`). The second
-    /// result is the derivative of F by the selected coordinate.
+    /// It is the coordinate with the largest derivative of F among those that are not at a limit; x is preferred. `low`
+    /// and `high` are the limits minus the coordinates of the hop's end, m. F is half the margin of the hop to its
+    /// target: 0 for a hop of maximum length (see `hop`). The second result is the derivative of F by the selected
+    /// coordinate.
     fn axis(
         &self,
         c: f32,

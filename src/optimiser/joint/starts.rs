@@ -14,8 +14,8 @@ use crate::sir::square;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
-    /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and height of its middle,
-    /// in units of half the distance from Tx to Rx.
+    /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and the height of the
+    /// parabola's middle, in units of half the distance from Tx to Rx.
     Arch { aside: f32, up: f32 },
     /// Initial chain on a spiral about the interferer. The spiral leads from Tx to Rx through a position P exactly
     /// above or beside the interferer.
@@ -23,9 +23,9 @@ pub(super) enum Start {
     /// `aside` and `up` are the direction from the interferer to P. `far` is the distance of P from the interferer,
     /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
-    /// Initial chain on a parabola as for `Arch`, but without a minimum separation. The solver then searches the
-    /// highest target of this chain, with the hops computed exactly as in flight. A relay is allowed to stay closer to
-    /// Tx than the largest x at which its hop meets the target.
+    /// Initial chain on a parabola as for `Arch`, with the same fields, but without a minimum separation. The solver
+    /// then searches the highest target of this chain, with the hops computed exactly as in flight. A relay is allowed
+    /// to stay closer to Tx than the largest x at which its hop meets the target.
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
@@ -36,15 +36,16 @@ pub(super) enum Start {
     FixedAltitudes { aside: f32, level: bool },
     /// Initial chain in a zigzag, for relays that do not fit between Tx and Rx in one line.
     ///
-    /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position beside it,
-    /// at the minimum separation. The corner is at the highest altitude, on the side of the line Tx to Rx opposite the
-    /// interferer.
+    /// The permitted lateral offsets and altitudes form a rectangle. Every second relay is in one corner of it, and the
+    /// relays between are beside this corner, at the minimum separation. The corner is at the highest altitude, on the
+    /// side of the line Tx-Rx opposite the interferer.
     Turns,
-    /// Initial chain at the lowest altitude, for a target at which no chain gets past the interferer.
+    /// Initial chain at the lowest altitude, for a target just above `Chain::floor`, the lowest target. Used only if no
+    /// earlier initial chain has led to a higher target.
     Near,
-    /// Initial chain with relay 1 at the x of Rx, high above Rx or beside Rx at the largest lateral offset. The lateral
-    /// offsets and altitudes of the other relays lead from there in equal steps to the line Tx-Rx and the lowest
-    /// altitude.
+    /// Initial chain with relay 1 at the x of Rx, high above Rx or beside Rx at the largest lateral offset. From relay
+    /// to relay, the lateral offset and the altitude change in equal steps. The last relay has the lateral offset 0 and
+    /// the lowest altitude.
     Far,
 }
 
@@ -59,7 +60,7 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of entries, counted from the start of [`ARCHES`], that are also tried without a separation.
+/// Number of parabolas, from the start of [`ARCHES`], that are also tried as [`Start::Through`].
 const THROUGH: usize = 3;
 
 /// Initial chains for missions with fixed altitudes; the fields are those of [`Start::FixedAltitudes`].
@@ -85,7 +86,7 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral about the interferer: the logarithm of the distance from it changes linearly with the angle.
+/// Logarithmic spiral about the interferer: ln(distance from it) changes linearly with the angle.
 struct Way {
     to: Triple,
     angle: f32,
@@ -200,7 +201,7 @@ impl Start {
         })
     }
 
-    /// Returns the initial chain `number` for relays with the lateral offsets and altitudes `room`. `None` if there is
+    /// Returns the initial chain `number`; `room` has the permitted lateral offsets and altitudes. `None` if there is
     /// no chain with this number; `Some(None)` if the chain does not fit into `room`.
     #[expect(
         clippy::option_option,

@@ -49,8 +49,8 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the view decided on `proposal` after it has visited `nodes` in this order. `None` without a quorum.
-    /// `accept` is the number of nodes, from the end of `nodes`, that receive the decision.
+    /// Returns the view decided on `proposal` after it has visited `nodes` in this order. `None` without a quorum. The
+    /// last `accept` nodes of `nodes` receive the decision.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -76,7 +76,7 @@ impl Chain {
     }
 }
 
-/// Returns the view of `relays` relays on proposal `number` of node `node`.
+/// Returns a view of `relays` relays, which node `node` proposed with the view number `number`.
 fn view(number: u32, node: u32, relays: u16) -> View {
     let id = id(number, node);
     View { id, relays }

@@ -27,8 +27,8 @@ const SHORTEST: f32 = 1e-8;
 
 /// Levels of a hop: ln F and ln(B / r), with the SIR F toward Rx and the SIR B toward Tx.
 ///
-/// The mission requires the ratio r of B to F. All pairs of values for a hop have the order toward Rx, toward Tx. The
-/// *slack* of a level is the level minus the target.
+/// r is the ratio of B to F that the mission requires. In all pairs of values for a hop, the first value is for data
+/// toward Rx, the second for data toward Tx. The *slack* of a level is the level minus the target, in ln(SIR).
 pub(super) type Levels = [f32; 2];
 
 /// Symmetric 3 x 3 matrix with rows and columns x, y and altitude h. The elements are xx, xy, xh, yy, yh, hh.
@@ -91,8 +91,9 @@ impl LogGains {
         }
     }
 
-    /// Returns the logarithms of hop `k`'s gains toward Rx and toward Tx; the latter gain is divided by r. `k` is 1
-    /// (from Tx) to N + 1 (to Rx).
+    /// Returns the logarithm of hop `k`'s gain toward Rx, and that of its gain toward Tx divided by r.
+    ///
+    /// r is the required ratio of backward to forward SIR. `k` is 1 for the hop from Tx, and N + 1 for the hop to Rx.
     fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;

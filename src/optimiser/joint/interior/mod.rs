@@ -48,7 +48,8 @@ const CLOSE_MU: f32 = 3e-3;
 /// concave around the optimum.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor on the barrier weight, applied once a Newton step raises the merit only a little.
+/// Factor that lowers the barrier weight, once a Newton step raises the merit only a little. The merit is the maximised
+/// function.
 const LESS: f32 = 0.3;
 
 /// Increase of the merit, divided by the barrier weight, below which the optimum counts as reached. This limit applies
@@ -60,18 +61,21 @@ const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Maximum step of a coordinate toward its limit, as a fraction of the distance to that limit.
+/// Maximum step of a coordinate toward its lower or upper limit, divided by the distance to that limit.
 const NEAR_BOX: f32 = 0.98;
 /// Factor on the length of a Newton step that lowers the merit (the maximised function).
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and its value at the optimum. Multipliers are limited to this range.
+/// Maximum factor by which a Lagrange multiplier may differ from mu / slack, its value at the optimum. A multiplier
+/// that differs more is set to the end of this range.
 const APART: f32 = 5.0;
 
-/// Number of Newton iterations per call in the computation of the target T, in ln(SIR).
+/// Number of Newton iterations per call that compute the target T. T, in ln(SIR), is slightly below the SIRs of all
+/// hops.
 const STEPS: u8 = 4;
-/// Index, from 0, of the last Newton iteration in the computation of the target T, in ln(SIR).
+/// Index, from 0, of the last Newton iteration that computes the target T. T, in ln(SIR), is slightly below the SIRs of
+/// all hops.
 const TARGETS: u8 = 12;
 /// Relative error of the equation for the target T, at which the Newton iteration for T ends. The equation is: the sum
 /// of mu / (c - T) over all levels c is 1, with the barrier weight mu.
@@ -106,7 +110,8 @@ pub(super) struct Node {
     hop: Hop,
 }
 
-/// Algorithm 1, the computation of all x for one target, uses the memory that later holds the levels.
+/// Memory for Algorithm 1, which computes the x of all relays for one target. The memory is that of the hop's levels,
+/// which are computed later.
 impl Noted for Node {
     fn lengths_m(&mut self) -> &mut [f32; 2] {
         &mut self.hop.level
@@ -187,8 +192,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Minimum distances along x: of relay 1 from Rx, and of the last relay from Tx. The unit is the distance from Tx
-    /// to Rx.
+    /// Minimum distance of relay 1 from Rx along x, and minimum distance of the last relay from Tx. The unit is the
+    /// distance from Tx to Rx.
     pub(super) closed: [f32; 2],
     pub(super) nodes: [Node; RELAYS],
     last: Hop,
@@ -203,7 +208,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     least: f32,
     /// Merit (the maximised function) at the stored positions. A step is accepted if it does not lower the merit.
     merit: f32,
-    /// Sum of the barrier's logarithms at the tried positions, for the hops handled so far.
+    /// Sum of the logarithms in the merit (the maximised function), over the hops handled so far. The logarithms are
+    /// those for the tried positions.
     sum: f32,
     /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions.
     share: f32,
@@ -366,8 +372,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues the interior-point method by a bounded amount of work. `Ready` at the end, with a target in ln(SIR).
-    /// The target is slightly below all [levels](Levels) of the hops at the stored positions.
+    /// Continues the interior-point method by a bounded amount of work. `Ready` at the end with the target T, in
+    /// ln(SIR). T is slightly below all [levels](Levels) of the hops at the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -415,8 +421,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the [levels](Levels) of ten hops from hop `k`, and adds the hops' receivers to the barrier. The barrier
-    /// is the sum of ln(distance of a coordinate to its limit).
+    /// Computes the [levels](Levels) of ten hops from hop `k` on, and the barrier terms of their receivers. A barrier
+    /// term is the logarithm of a coordinate's distance to its limit.
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -484,9 +490,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts the tried step if it does not lower the merit; otherwise shortens the step. If the shortest step also
-    /// lowers the merit, a new step is computed without negative curvature. If the shortest part of the new step lowers
-    /// the merit too, the barrier weight falls.
+    /// Accepts the tried Newton step if it does not lower the merit; otherwise shortens the step. If the shortest step
+    /// also lowers the merit, a new Newton step is computed without negative curvature. If the shortest part of that
+    /// step lowers the merit too, the barrier weight is lowered. The merit is the maximised function.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -552,8 +558,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers the barrier weight and continues; `Ready` with the target, in ln(SIR), after the last weight. `resets` is
-    /// true to replace the Lagrange multipliers, because no step with them has raised the merit.
+    /// Lowers the barrier weight and continues. `Ready` with the target, in ln(SIR), if the lowest barrier weight is
+    /// already in use. `resets` is true to replace the Lagrange multipliers, because no step with them has raised the
+    /// merit.
     fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
@@ -575,7 +582,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Eliminates the first `count` relays of `segment` from the Newton system. Returns the equations of the next
-    /// relay; `None` if a pivot is not positive. `factors` receives the factors of the last six eliminated relays.
+    /// relay; `None` if a pivot is not positive. `factors` receives the equations of the last six eliminated relays,
+    /// from which their Newton steps are computed.
     #[inline(never)]
     fn eliminate(
         &mut self,

@@ -33,20 +33,20 @@ const LEAST_PIVOT: f32 = 1e-6;
 /// this coordinate.
 const STIFF: f32 = 1e18;
 
-/// Equations of the Newton system for one relay, after the elimination of all previous relays. The terms of the hop
-/// to the next relay are not added yet.
+/// Equations of the Newton system for one relay, after the elimination of all previous relays. They do not contain the
+/// terms of the hop to the next relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Symmetric,
     slope: Triple,
     column: Triple,
-    /// Amount that the elimination of earlier relays subtracted from the diagonal of `bend`.
+    /// Amount by which the elimination of earlier relays has lowered the diagonal of the matrix `bend`.
     taken: Triple,
 }
 
 /// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the next
-/// relay's steps in x, y and h. The last two are the right-hand side: a constant, and a coefficient of the target's
-/// change.
+/// relay's steps in x, y and h. The last two form the right-hand side: a constant, and the coefficient of the Newton
+/// step of the target T.
 type Row = [f32; 5];
 
 /// Equations of an eliminated relay, for the computation of its Newton step.
@@ -59,7 +59,7 @@ pub(super) struct Factor {
     rows: [Row; 3],
 }
 
-/// Sums over all hops and relays, for the Newton step of the target T, in ln(SIR).
+/// Sums over all hops and relays that determine the Newton step of the target T, in ln(SIR).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,
@@ -104,11 +104,11 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop` from the Newton system. On entry `self` has the rows of this relay, on return
-    /// the rows of the node at `spot`, where `hop` ends.
+    /// Eliminates the relay at which `hop` begins from the Newton system. Before the call, `self` has the equations of
+    /// this relay; after the call, those of the node at `spot`, where `hop` ends.
     ///
-    /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive. If
-    /// `convex` is true, a pivot can only be too small by rounding, and is raised instead.
+    /// If `hop` begins at Tx, `is_relay` is false, no relay is eliminated, and the returned factor is 0. `None` if a
+    /// pivot is not positive. If `convex` is true, a pivot can only be too small by rounding, and is raised instead.
     pub(super) fn pass(
         &mut self,
         is_relay: bool,
@@ -192,7 +192,8 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the terms of the eliminated previous relay, `factor`, from these equations. Adds the terms to `sums`.
+    /// Subtracts the terms of the eliminated previous relay, `factor`, from these equations. Also adds the contribution
+    /// of that relay to the sums over the chain, `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -271,7 +272,8 @@ impl Factor {
         rows: [[0.0; 5]; 3],
     };
 
-    /// Returns this relay's Newton step. `by_target` is the target's step, and `next` the next relay's step.
+    /// Returns this relay's Newton step in x, y and h. `by_target` is the Newton step of the target T, in ln(SIR), and
+    /// `next` the Newton step of the next relay toward Rx.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
         let known = (self.rows)
             .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));
@@ -286,8 +288,8 @@ impl Sums {
         column: 0.0,
     };
 
-    /// Returns the Newton step of the target T, in ln(SIR). `None` if the system has no maximum, so that there is no
-    /// step.
+    /// Returns the Newton step of the target T, in ln(SIR). `None` if the quadratic model of the Newton step has no
+    /// maximum.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;
         (rest > 0.0).then(|| self.slope / rest)

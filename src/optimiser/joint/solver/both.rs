@@ -27,31 +27,32 @@ use core::task::Poll;
 /// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
-/// Fraction by which relays move toward even spacing before the interior-point method starts. The move separates relays
-/// that have the same x. The first value is for the first run of this method, the second for repetitions.
+/// Fraction of the way to even spacing that relays move before the interior-point method starts. The move separates
+/// relays that have the same x. The first value is for the first run of this method from an initial chain, the second
+/// for repeated runs and for [`Along::Arc`].
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Description of an initial chain. The first relay is the one next to the end (Tx or Rx) with more power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offsets of the first, the middle and the last relay, on the side opposite the interferer. They are
-    /// fractions of the largest permitted offset.
+    /// Lateral offsets of the first, the middle and the last relay. They are fractions of the largest permitted offset
+    /// on the side of the line Tx-Rx opposite the interferer.
     aside: [f32; 3],
     /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
     up: [f32; 2],
     along: Along,
 }
 
-/// Way to choose the initial x of the relays along the line from Tx to Rx.
+/// Method that chooses the x of the relays in an initial chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Along {
     /// Best x for the lateral offsets and altitudes of the relays, computed by Algorithm 1.
     Line,
-    /// Spacing in equal steps, from the first to the last relay. The fields are the distances of these two relays from
-    /// the end (Tx or Rx) with more power. They are fractions of the distance from Tx to Rx.
+    /// Equal steps in x from the first to the last relay. The fields are the distances of these two relays from the end
+    /// (Tx or Rx) with more power. They are fractions of the distance from Tx to Rx.
     Even([f32; 2]),
-    /// Best x as for `Line`, but without the x that `close_beyond` excludes. Lateral offsets and altitudes fall along a
-    /// part of an ellipse to the end (Tx or Rx) with less power.
+    /// Best x as for `Line`, but without the range of x that `close_beyond` excludes. Lateral offsets and altitudes
+    /// follow a part of an ellipse, and become smaller toward the end (Tx or Rx) with less power.
     Arc,
 }
 
@@ -101,26 +102,28 @@ impl Start {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Search for the highest target SIR of an initial chain, before its relays are moved.
+    /// Search for the highest target SIR of an initial chain, before the interior-point method runs.
     Start,
     /// Search for the highest target SIR after a run of the interior-point method. The lateral offsets and altitudes
     /// are the result of this run.
     Result,
-    /// Finer search for the best chain's highest target, at the end of the whole solution.
+    /// Search for the best chain's highest target with a smaller tolerance, at the end of the solution.
     Last,
 }
 
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays done.
+    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays for which
+    /// they are chosen already.
     Begin(u16),
     /// Search for the highest target that Algorithm 1 meets at the current lateral offsets and altitudes.
     Seek(Seek, Purpose),
     /// Computation of the x of all relays by Algorithm 1. The field is the target that the hops have to meet, in
     /// ln(SIR).
     Settle(f32),
-    /// Choice of the positions at which the interior-point method starts. The field is the number of relays done.
+    /// Choice of the positions at which the interior-point method starts. The field is the number of relays for which
+    /// they are chosen already.
     Put(u16),
     Interior,
 }
@@ -144,7 +147,7 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
-    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
+    /// State of the solver before the first call of `step`. All its bytes are 0, so that it needs no flash memory.
     pub(super) const NEW: Self = Self {
         interior: Interior::NEW,
         best: None,
@@ -156,8 +159,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         number: 0,
     };
 
-    /// Continues the solution by one portion; ready with the target SIR, linear, at the end. A portion is two relays
-    /// of Algorithm 1, ten relays of a Newton step, or twenty relays of other work.
+    /// Continues the solution by one bounded step; ready with the target SIR, linear, at the end. A step handles two
+    /// relays of Algorithm 1, ten relays of a Newton step, or twenty relays of other work.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let next = match self.work {
             Work::Begin(done) => self.begin_start(chain, done),
@@ -220,9 +223,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Begin(0)
     }
 
-    /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. It skips the first
-    /// `done` relays, for which they are chosen already. After the last initial chain, the next work is the final
-    /// search for the best chain's target.
+    /// Chooses the lateral offsets and altitudes of up to 20 relays of the current initial chain. The first `done`
+    /// relays have them already. Returns the next work; after the last initial chain this is the final search for the
+    /// best chain's target.
     fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -260,9 +263,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     /// Excludes a range of x for the relay next to the end (Tx or Rx) with more power. In this range, beyond the
     /// interferer as seen from that end, the relay's SIR rises with its distance from the end.
     ///
-    /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
-    /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
-    /// interferer from the line is replaced by its distance from the relay's cross-section.
+    /// Let the relay be at x from that end, the interferer at X, and a the distance of the interferer from the line
+    /// Tx-Rx. The SIR is then proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2.
+    /// Instead of this a, the function uses the interferer's distance from the relay's lateral offset and altitude.
     fn close_beyond(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let (distance_m, is_turned) = (chain.distance_m(), is_turned(chain));
         let index = if is_turned { chain.relays() } else { 1 };
@@ -282,16 +285,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
-    /// altitude, gets the description of chain 1, but only `along` of it is used.
+    /// Returns the description of the current initial chain; `None` after the last one. For chain 0, at the common
+    /// altitude, it returns the description of chain 1. Only the field `along` of it is used.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
     }
 
     /// Stores the current chain if its target `sigma`, in ln(SIR), is the best so far. Returns the next work: a run of
-    /// the interior-point method from this chain, or the next initial chain. A repeated run requires that Algorithm 1
-    /// has found a higher target than the run before.
+    /// the interior-point method from this chain, or the next initial chain. The method runs again only if Algorithm 1
+    /// has found a higher target than the last run.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);
@@ -310,9 +313,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Chooses the positions at which the interior-point method starts, and starts the method. It skips the first
-    /// `done` relays, for which positions are chosen already. Lateral offsets and altitudes are the stored values. The
-    /// x come from Algorithm 1, or are evenly spaced.
+    /// Chooses the positions of up to 20 relays at which the interior-point method starts. The first `done` relays have
+    /// them already. The lateral offsets and altitudes are the stored ones; the x come from Algorithm 1, or are evenly
+    /// spaced. After the last relay the method starts.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.relays();
@@ -361,8 +364,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if the initial chains are described from Rx, false if from Tx. The result is true if Rx has more power
-/// than Tx. With equal powers it is true if less SIR is required toward Tx than toward Rx.
+/// Returns true if the initial chains are described from Rx to Tx, false if from Tx to Rx. The result is true if Rx has
+/// more power than Tx. With equal powers it is true if the required SIR toward Tx is lower than that toward Rx.
 fn is_turned(chain: &Chain<'_, impl SeatOf>) -> bool {
     let config = chain.mission.config();
     let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
@@ -391,6 +394,6 @@ const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// First target to try, minus the target of the interior-point method, in ln(SIR). The difference allows for the error
-/// of this method.
+/// Excess of the first target for Algorithm 1 over that of the interior-point method, in ln(SIR). The excess allows for
+/// the error of the interior-point method.
 const ABOVE: f32 = 1e-4;

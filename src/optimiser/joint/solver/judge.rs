@@ -13,17 +13,18 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision, in ln(SIR), of the search for a chain's highest target after moves of its relays.
+/// Precision, in ln(SIR), of the search for a chain's highest target after its improvement. The improvement moves the
+/// relays of the chain.
 pub(super) const JUDGED: f32 = 4e-6;
 
 /// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). The search for
 /// better chains ends if a chain reaches the bound within this tolerance.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// First limit on the target of a chain's improvement, minus the SIR's upper bound, in ln(SIR). The upper bound holds
-/// for all chains.
+/// First upper limit on a chain's target, minus the upper bound on the SIR of all chains, in ln(SIR).
 ///
-/// At this limit the search checks if the chain reaches the upper bound; if so, the search ends.
+/// When the improvement of a chain reaches this limit, the search checks if the chain reaches the upper bound. If so,
+/// no further initial chain is tried.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -156,11 +157,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the current chain's highest target, once its relays were moved.
+    /// Returns the work that searches for the current chain's highest target after its improvement.
     ///
     /// Hops are computed exactly as the relays compute them from their messages. A relay is allowed to stay closer to
-    /// Tx than the largest x at which its hop meets the target. `sigma` is the target at which the moves of the relays
-    /// ended, and `ceiling` the upper bound of all chains, both in ln(SIR).
+    /// Tx than the largest x at which its hop meets the target. `sigma` is the target at which the improvement ended,
+    /// and `ceiling` the upper bound of all chains, both in ln(SIR).
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -171,14 +172,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the current chain can still become the best chain. Its relays are then moved again.
+    /// Returns true if the current chain can still become the best chain. Its improvement is then repeated.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current chain can no longer become the best chain. The moves of its relays then end. `turn`
-    /// is the next action in the computation of these moves.
+    /// Returns true if the current chain can no longer become the best chain. Its improvement then ends. `turn` is the
+    /// next action of the improvement.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -213,12 +214,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays in a chain whose relays are moved singly. Single relays are moved after the search over the
-/// initial chains. In a chain with fixed altitudes of some relays there is no maximum.
+/// Maximum number of relays in a chain for which trial moves of single relays are made. These moves follow the search
+/// over the initial chains. In a chain with fixed altitudes of some relays there is no maximum.
 const POLISHED: u16 = 5;
 
-/// Number of times that the trial moves of single relays are halved. Single relays are moved after the search over the
-/// initial chains.
+/// Number of times that the length of the trial moves of single relays is halved. These moves follow the search over
+/// the initial chains.
 const HALVINGS: u16 = 12;
 /// First trial move of a single relay, as a fraction of its allowed range. Single relays are moved after the search
 /// over the initial chains.
@@ -230,9 +231,9 @@ pub(super) const GAIN: f32 = 2e-5;
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the current trial move: the relay's index, the kind of move, and the number of halvings. Kinds 0 to 3
-    /// move the relay down, up, or to the sides. Kinds 4 and 5 copy the lateral offset and altitude of relay i + 2 or
-    /// relay i - 2 to relay i.
+    /// Returns the current trial move: the relay's index, the kind of move, and the number of halvings. Kinds 0 and 1
+    /// move the relay down and up, kinds 2 and 3 to its two sides. Kinds 4 and 5 give relay i the lateral offset and
+    /// altitude of relay i + 2 or relay i - 2.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -242,8 +243,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Tries the next move of one relay in a chain that meets the target `sigma`, in ln(SIR).
     ///
-    /// The relay moves by a fraction of its allowed range, which is halved from round to round. Or it takes the lateral
-    /// offset and altitude of a different relay. These moves find improvements that the derivatives do not show.
+    /// The relay moves by a fraction of its allowed range. This fraction is halved after each round over all relays. Or
+    /// the relay takes the lateral offset and altitude of a different relay. These moves find improvements that a
+    /// search by derivatives misses.
     pub(super) fn polish(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -289,7 +291,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Begins the moves of the relays of the next initial chain. Ends the search after the last initial chain.
+    /// Begins the search from the next initial chain. After the last one, begins the final search with the best chain
+    /// found.
     pub(super) fn begin(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -339,7 +342,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns true if the initial chain `start` cannot lead to a better chain than the best one found.
+    /// Returns true if the initial chain `start` is not tried. It is not for this mission, or cannot lead to a better
+    /// chain than the best one found.
     fn is_skipped(&self, chain: &Chain<'_, impl SeatOf>, start: Start) -> bool {
         match start {
             Start::Near if self.again => false,
@@ -355,8 +359,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they belong to a new initial
-    /// chain, otherwise to the stored chain.
+    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they are those of the initial
+    /// chain to be tried, otherwise the stored ones.
     pub(super) fn shaped(
         &self,
         chain: &Chain<'_, impl SeatOf>,

@@ -59,13 +59,14 @@ impl ForwardPass {
 enum Work {
     /// Begin the next initial chain.
     Begin,
-    /// Search for the highest target SIR that the chain meets without moves of its relays.
+    /// Search for the highest target SIR that the chain meets at its lateral offsets and altitudes.
     Seek(Seek, Purpose),
     /// Compute the chain for one target, as ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Try the next move of one relay. The field is the target that the chain meets now, in ln(SIR).
+    /// Try the next move of one relay. The field is the highest target that the chain met before this move, in ln(SIR).
     Polish(f32),
-    /// Run the backward pass, which computes the relays' moves, for the segment with this number.
+    /// Run the backward pass, which computes the relays' moves, for one segment (ten relays). The field is the
+    /// segment's number.
     Back(u8),
     /// Run the forward pass, which moves the relays. The fields are the fraction of the computed moves, the target in
     /// ln(SIR), and a flag: true to store the chain, false for a trial.
@@ -76,16 +77,17 @@ enum Work {
 enum Purpose {
     /// Search for the highest target SIR of an initial chain, before its relays are moved.
     Start,
-    /// Search for the highest target that the current chain meets without moves of its relays.
+    /// Search for the highest target of the current chain at unchanged lateral offsets and altitudes.
     Raise,
-    /// Computation of the chain's slack under a lowered upper limit on it. Slack above the limit does not count.
+    /// Computation of the chain's slack, after the upper limit on the slack was lowered. The slack is the length by
+    /// which the chain reaches beyond Rx. Slack above the limit does not count.
     Tighten,
-    /// Search for the highest target of a chain once its relays were moved. Hops are computed as for these moves, not
+    /// Search for the highest target of a chain after its improvement. Hops are computed as in the improvement, not
     /// exactly as in flight.
     Judge,
-    /// Search for the highest target of a chain once its relays were moved. Hops are computed exactly as in flight.
+    /// Search for the highest target of a chain after its improvement. Hops are computed exactly as in flight.
     Last,
-    /// Check if the chain reaches the SIR's upper bound of all chains. Hops are computed exactly as in flight.
+    /// Check if the chain reaches the upper bound on the SIR of all chains. Hops are computed exactly as in flight.
     Probe,
     /// Check of a trial move of one relay, with the hops computed exactly as in flight.
     Move,
@@ -111,17 +113,17 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Highest target that any chain has reached by moves of its relays, in ln(SIR). A chain that is predicted to end
-    /// below it is dropped.
+    /// Highest target that any chain has reached by moves of its relays, in ln(SIR). The improvement of a chain stops
+    /// once it is predicted to end below this target.
     highest: f32,
     best_cells: Cells<RELAYS>,
-    /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for this chain's highest
-    /// target starts there.
+    /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for the highest target of
+    /// this chain starts at this value.
     best_judged: Option<f32>,
     /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, or if it
     /// was stopped early.
     judged_at: Option<f32>,
-    /// True if the current chain's improvement has not been stopped early.
+    /// True unless the current chain's improvement was stopped early, because the chain was not promising.
     is_whole: bool,
     /// True in the last phase: finer search of the best chain's target, and trial moves of single relays.
     again: bool,
@@ -134,7 +136,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// True if some relays have to stay closer to Tx than their farthest x to meet the target found. The farthest x is
     /// the largest x at which the hop to the relay meets the target.
     holds_back: bool,
-    /// True if the minimum separation of relays has restricted the improvement of any chain.
+    /// True if the improvement of some chain ended with a penalty for too little separation of relays.
     walled: bool,
     /// Number of the next trial move of a single relay; see [`OneWay::move_of`]. Single relays are moved after the
     /// search over the initial chains.
@@ -151,7 +153,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
+    /// State of the solver before the first call of `step`. All its bytes are 0, so that it needs no flash memory.
     const NEW: Self = Self {
         number: 0,
         start: Start::Arch {
@@ -424,8 +426,8 @@ mod tests {
     }
 
     /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is the
-    /// target; then follow each relay's lateral offset and altitude. If `once_more` is true, the best chain is computed
-    /// again instead of stored.
+    /// target; then follow each relay's lateral offset and altitude. If `once_more` is true, the solver computes the
+    /// best chain again, and does not use its stored copy.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],

@@ -105,9 +105,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Continues the forward pass by one segment. If the moves of its relays are not in memory, computes them instead.
-    /// The pass tries the fraction `share` of the moves with the target `sigma`, in ln(SIR). The chain is stored if
-    /// `kept` is true.
+    /// Continues the forward pass by one segment (ten relays). If the moves of these relays are not in memory, the call
+    /// computes only the moves, and the next call continues. The pass tries the fraction `share` of the moves with the
+    /// target `sigma`, in ln(SIR). The chain is stored if `kept` is true.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -183,7 +183,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays per call in a pass that computes only x, not lateral offsets and altitudes.
+/// Number of relays that one call handles in a pass that computes only the relays' x.
 const PLAIN: u16 = 20;
 
 /// Maximum penalty up to which a chain counts as feasible after moves of its relays. The penalty is for relays too near
