@@ -196,7 +196,7 @@ local messages = {
         { name = "in_place", kind = "bool", unit = "", text = "true if the sender and all relays after it are in place" },
         { name = "nodes", kind = "option", of = { kind = "group", fields = {
             { name = "leaver", kind = "u16", unit = "", text = "relay that would leave, or 0" },
-            { name = "spare", kind = "u16", unit = "", text = "one that would join, or 0" },
+            { name = "spare", kind = "u16", unit = "", text = "spare that would join, or 0" },
         } }, unit = "", text = "none if both are 0:" },
         { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed, back from the last relay; else the other fields have no meaning" },
     } },
