@@ -31,7 +31,7 @@ fn json(arguments: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Returns the report of a run that does not succeed: its exit status is 1, and its error contains `reason`.
+/// Returns the report of a run with exit status 1, whose error contains `reason`.
 fn unmet(arguments: &str, reason: &str) -> Value {
     let output = chain(&format!("--json {arguments}"));
     assert_eq!(output.status.code(), Some(1), "{arguments}");

@@ -65,8 +65,9 @@ pub(crate) struct Step {
 pub(crate) enum Lane {
     /// Main lane: its steps run one after the other.
     Main,
-    /// Lane of steps that mostly wait for the wall clock, at the highest priority, so that other steps do not delay them.
+    /// Lane of steps that mostly wait for the wall clock, at the highest priority.
     ///
+    /// Other steps do not delay them.
     /// Such a step starts after the previous step of the main lane. The main lane then continues at once.
     Waiting,
     /// Lane of steps at low priority, one after the other, each with a target folder of its own.
@@ -257,8 +258,9 @@ pub(crate) fn all() -> Vec<Step> {
     steps
 }
 
-/// Integration tests that mostly wait for the wall clock: name of the step, name of the test, and its environment.
+/// Integration tests that mostly wait for the wall clock.
 ///
+/// Each has the name of its step, the name of the test, and its environment.
 /// `RUST_TEST_THREADS` is the number of tests at a time. It may exceed the number of cores: each test uses a few per cent of a core.
 /// The tests of firmware images run one fleet with fast clocks at a time, and the three fleets in real time beside it.
 const WAITING_TESTS: [(&str, &str, Environment); 3] = [
