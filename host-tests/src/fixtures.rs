@@ -1,6 +1,6 @@
 //! Common fixtures of tests: the paper's chain, and one relay of a chain.
 
-use uav_relay::{Identity, Instant, Mission, MissionConfig, Relay, Settings, ViewRecord};
+use uav_relay::{Identity, Instant, Mission, MissionConfig, Relay, Settings, ViewRecord, Wiring};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::Scenario;
@@ -40,6 +40,19 @@ pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
         index,
     };
     Relay::new(mission, identity, settings, u32::from(index), Instant::ZERO).unwrap()
+}
+
+/// Creates relay `index` of `relays` in the paper's scenario, with default settings but the `wiring`.
+///
+/// # Panics
+/// The chain has no such relay.
+pub fn wired(relays: u16, index: u16, wiring: Wiring) -> Relay {
+    let mission = Mission::try_new(paper(relays)).unwrap();
+    let settings = Settings {
+        wiring,
+        ..Settings::default()
+    };
+    relay(mission, index, settings)
 }
 
 /// Returns the stored votes of a relay that has agreed on view `number`, proposed by relay 1.

@@ -10,20 +10,10 @@ use futures_util::task::LocalSpawnExt as _;
 use host_tests::fixtures;
 use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, AsyncShared};
 use uav_relay::serial::SerialStats;
-use uav_relay::{Event, Instant, Mission, Placement, Port, Relay, Settings, Wiring};
+use uav_relay::{Event, Instant, Placement, Port, Wiring};
 
 use crate::time::Time;
 use crate::wire::{BAUD, Rx, Shared, TimedFrame, Tx, WriterFault, line};
-
-/// Creates relay `index` of `relays` in the paper's scenario.
-pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
-    let mission = Mission::try_new(fixtures::paper(relays)).unwrap();
-    let settings = Settings {
-        wiring,
-        ..Settings::default()
-    };
-    fixtures::relay(mission, index, settings)
-}
 
 /// Fault to inject, if any: index of the relay, its port, and the behaviour of the port's writer.
 pub(crate) type InjectedFault = Option<(u16, Port, WriterFault)>;
@@ -92,7 +82,7 @@ pub(crate) fn fly(
                 let mut ports = AsyncPair::new(up, down);
                 let time = time.clone();
                 Box::pin(async move {
-                    let mut relay = relay(relays, index, wiring);
+                    let mut relay = fixtures::wired(relays, index, wiring);
                     let relay = AsyncRelay::new(&mut relay);
                     let runs = ports.run(&relay, &time, |_| true);
                     join(runs, firmware(&relay, &time, &drone)).await;
@@ -103,7 +93,7 @@ pub(crate) fn fly(
                 let mut ports = AsyncShared::new(AsyncLink::new(rx, tx, BAUD));
                 let time = time.clone();
                 Box::pin(async move {
-                    let mut relay = relay(relays, index, wiring);
+                    let mut relay = fixtures::wired(relays, index, wiring);
                     let relay = AsyncRelay::new(&mut relay);
                     let runs = ports.run(&relay, &time, |_| true);
                     join(runs, firmware(&relay, &time, &drone)).await;

@@ -14,9 +14,9 @@ use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, AsyncShared, Clock};
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::{Instant, Port, Wiring};
 
-use crate::chain::relay;
 use crate::time::Time;
 use crate::wire::{BAUD, BYTE_TIME, Rx, Tx, WriterFault, line};
+use host_tests::fixtures::wired;
 
 /// Simulated port writer that accepts only part of the bytes of a write, or blocks for ever, or fails.
 #[derive(Default)]
@@ -133,7 +133,7 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
             AsyncLink::new(Silent, Taker::default(), BAUD),
             AsyncLink::new(Silent, down, BAUD),
         );
-        let mut relay = relay(2, 1, Wiring::Pair);
+        let mut relay = wired(2, 1, Wiring::Pair);
         let relay = AsyncRelay::new(&mut relay);
         run_for(&time, 0..3_000, ports.run(&relay, &time, |_| true));
         assert_eq!(writes.get(), 0);
@@ -163,7 +163,7 @@ fn a_failed_write_is_counted_and_the_frame_sent_again() {
         AsyncLink::new(Silent, Taker::default(), BAUD),
         AsyncLink::new(Silent, down, BAUD),
     );
-    let mut relay = relay(2, 1, Wiring::Pair);
+    let mut relay = wired(2, 1, Wiring::Pair);
     let relay = AsyncRelay::new(&mut relay);
     run_for(&time, 0..20_000, ports.run(&relay, &time, |_| true));
     let [whole, spoiled] = deframed(&taken.borrow());
@@ -190,7 +190,7 @@ fn an_always_ready_port_starves_no_other_port() {
             AsyncLink::new(Flood { fails }, Taker::default(), BAUD),
             AsyncLink::new(Silent, down, BAUD),
         );
-        let mut relay = relay(2, 1, Wiring::Pair);
+        let mut relay = wired(2, 1, Wiring::Pair);
         let relay = AsyncRelay::new(&mut relay);
         run_for(&time, 0..3_000, ports.run(&relay, &time, |_| true));
         assert!(deframed(&taken.borrow())[0] > 3, "{fails}");
@@ -265,7 +265,7 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
             let time = time.clone();
             async move {
                 let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
-                let mut relay = relay(2, 1, Wiring::Shared);
+                let mut relay = wired(2, 1, Wiring::Shared);
                 let relay = AsyncRelay::new(&mut relay);
                 let counted = poll_fn(|_| {
                     // The statistics are checked at every poll.

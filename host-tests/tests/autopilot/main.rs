@@ -386,6 +386,23 @@ fn a_short_hold_reason_is_not_reported() {
     assert!(vehicle.has_text("relay: waits, too close to the previous drone"));
 }
 
+/// Checks that a lasting reason is reported if the caller's clock steps back by 500 s while it lasts.
+#[test]
+fn a_hold_reason_is_reported_after_the_clock_steps_back() {
+    use uav_relay::HoldReason::Close;
+
+    let mut vehicle = Vehicle::flying(Kind::ArduCopter);
+    vehicle.link.handle_hold(vehicle.now, [Some(Close), None]);
+    for time in [&mut vehicle.now, &mut vehicle.began] {
+        *time = Instant::from_micros(time.as_micros() - 500_000_000);
+    }
+    for _ in 0..200 {
+        vehicle.link.handle_hold(vehicle.now, [Some(Close), None]);
+        vehicle.run(20);
+    }
+    assert!(vehicle.has_text("relay: waits, too close to the previous drone"));
+}
+
 #[test]
 fn the_operator_gets_the_guards_hold_reason() {
     use uav_relay::HoldReason::{Order, Unheard};

@@ -102,7 +102,7 @@ pub(crate) struct Vehicle {
     kind: Kind,
     pub(crate) link: Autopilot,
     pub(crate) now: Instant,
-    began: Instant,
+    pub(crate) began: Instant,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
     pub(crate) mode: Mode,

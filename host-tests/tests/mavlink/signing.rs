@@ -225,3 +225,16 @@ fn stamps_begin_in_2015_and_end_with_48_bits() {
     assert_eq!(first(1_420_070_401 * 1_000_000), 100_000);
     assert_eq!(first(u64::MAX), (1 << 48) - 1);
 }
+
+/// Checks that timestamps keep up with time if the time between frames is no multiple of their unit.
+#[test]
+fn parts_of_a_unit_between_frames_are_not_lost() {
+    let mut ours = signing(KEY);
+    let heartbeat = Outgoing::Heartbeat.encode(COMPANION, AUTOPILOT, 0);
+    for frame in 0..=1_000 {
+        // 1.9 units.
+        let now = Instant::from_micros(frame * 19);
+        let stamp = stamp_of(&ours.sign(now, heartbeat.clone()));
+        assert_eq!(stamp, STAMP + frame * 19 / 10);
+    }
+}

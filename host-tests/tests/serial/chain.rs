@@ -2,7 +2,7 @@
 
 use host_tests::fixtures;
 use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared};
-use uav_relay::{Duration, Event, Instant, Mission, Placement, Relay, Settings, Side, Wiring};
+use uav_relay::{Duration, Event, Instant, Placement, Relay, Side, Wiring};
 
 use crate::pipe::{End, IoEnd, NbEnd, ReadErrors};
 
@@ -10,16 +10,6 @@ pub(crate) const BAUD: u32 = 115_200;
 
 /// Transmission time of one byte at [`BAUD`].
 pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
-
-/// Creates relay `index` of `relays` in the paper's scenario.
-pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
-    let mission = Mission::try_new(fixtures::paper(relays)).unwrap();
-    let settings = Settings {
-        wiring,
-        ..Settings::default()
-    };
-    fixtures::relay(mission, index, settings)
-}
 
 /// Port driver of a relay, for two wires or a shared channel. The simulated ports are of the type `IoEnd` or `NbEnd`.
 pub(crate) trait Driver {
@@ -116,7 +106,7 @@ pub(crate) fn chain(
     };
     let nodes = (1..=relays)
         .zip(&ends)
-        .map(|(index, ends)| Node::new(kind, relay(relays, index, wiring), ends, trouble))
+        .map(|(index, ends)| Node::new(kind, fixtures::wired(relays, index, wiring), ends, trouble))
         .collect();
     (nodes, far)
 }

@@ -6,15 +6,16 @@ use std::rc::Rc;
 use uav_relay::serial::{Io, Nb, SerialLink, SerialPort, Shared};
 use uav_relay::{Instant, Wiring};
 
-use crate::chain::{BAUD, BYTE_TIME, relay};
+use crate::chain::{BAUD, BYTE_TIME};
 use crate::uart::{Bench, IoUart, Pin, Uart};
+use host_tests::fixtures::wired;
 
 /// Runs a relay without a neighbour for `millis` ms of simulated time. Returns the number of errors of the
 /// driver-enable pin.
 fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     let pin = Pin(Rc::clone(bench));
     let mut driver = Shared::new(SerialLink::half_duplex(port, BAUD, pin));
-    let mut relay = relay(2, 1, Wiring::Shared);
+    let mut relay = wired(2, 1, Wiring::Shared);
     let mut now = Instant::ZERO;
     while now < Instant::from_millis(millis) {
         bench.borrow_mut().clock = now.as_micros();

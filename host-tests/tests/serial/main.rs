@@ -5,9 +5,9 @@ mod driver_enable;
 mod pipe;
 mod uart;
 
-use chain::{BYTE_TIME, Kind, Node, chain, has_lost, relay, run, setpoints};
+use chain::{BYTE_TIME, Kind, Node, chain, has_lost, run, setpoints};
 use host_tests::bench::agreed;
-use host_tests::fixtures;
+use host_tests::fixtures::{self, wired};
 use pipe::{End, ReadErrors};
 use uav_relay::serial::{READ_LIMIT, SerialStats};
 use uav_relay::{Instant, Mission, Placement, Side, Wiring};
@@ -50,8 +50,8 @@ fn an_unread_link_does_not_starve_the_other_link() {
         let [last, _rx] = End::wire(16);
         let none = ReadErrors::default();
         let mut nodes = vec![
-            Node::new(kind, relay(3, 2, Wiring::Pair), &[deaf, up], &none),
-            Node::new(kind, relay(3, 3, Wiring::Pair), &[down, last], &none),
+            Node::new(kind, wired(3, 2, Wiring::Pair), &[deaf, up], &none),
+            Node::new(kind, wired(3, 3, Wiring::Pair), &[down, last], &none),
         ];
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(300_000));
         assert_eq!(nobody.waiting(), 3, "{kind:?}: the wire is full");
@@ -107,7 +107,7 @@ fn on_a_shared_channel_frames_wait_and_none_is_dropped() {
     for kind in KINDS {
         let mut ends = End::channel(2, 3);
         let (nobody, end) = (ends.remove(0), ends.remove(0));
-        let relay = relay(2, 1, Wiring::Shared);
+        let relay = wired(2, 1, Wiring::Shared);
         let mut nodes = [Node::new(kind, relay, &[end], &ReadErrors::default())];
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(60_000));
         assert_eq!(nobody.waiting(), 3);
@@ -153,7 +153,7 @@ fn a_failing_port_does_not_starve_the_others() {
     let [up, _] = End::wire(16);
     let [down, _] = End::wire(16);
     up.add_received(&[1; 10_000]);
-    let mut node = Node::new(Kind::Nb, relay(2, 1, Wiring::Pair), &[up, down], &dead);
+    let mut node = Node::new(Kind::Nb, wired(2, 1, Wiring::Pair), &[up, down], &dead);
     let now = Instant::from_millis(1);
     let wake = node.driver.poll(now, &mut node.relay);
     let stats = node.driver.stats()[0];
@@ -171,7 +171,7 @@ fn a_poll_reads_up_to_its_limit_and_asks_to_be_called_soon() {
         let ends = [up.clone(), down];
         let mut node = Node::new(
             kind,
-            relay(2, 1, Wiring::Pair),
+            wired(2, 1, Wiring::Pair),
             &ends,
             &ReadErrors::default(),
         );
@@ -225,7 +225,7 @@ fn an_idle_facade_has_only_the_relays_timeouts() {
 #[test]
 fn frames_for_an_absent_port_are_counted() {
     let [end, far] = End::wire(1000);
-    let relay = relay(2, 1, Wiring::Pair);
+    let relay = wired(2, 1, Wiring::Pair);
     let mut nodes = [Node::new(Kind::Nb, relay, &[end], &ReadErrors::default())];
     run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
     let stats = nodes[0].driver.stats()[0];

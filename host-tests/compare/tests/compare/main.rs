@@ -177,23 +177,26 @@ fn the_reported_sir_is_that_of_the_positions() {
     );
 }
 
-#[test]
-fn chosen_altitudes_count_in_the_sir() {
-    let corridor = Corridor::plane(20.0, 300.0);
+/// Returns the best SIR and positions of eight relays in `corridor`, 150 m beside the interferer.
+fn best_beside(corridor: Corridor) -> (f64, Vec<[f64; 3]>) {
     let link = Link {
         y_i: 150.0,
         min_separation_m: 4.0,
         ..Link::paper(8)
     };
     let best = optimum(&link, corridor, &[]).unwrap().unwrap();
-    let mut chain: Vec<[f64; 3]> = best
-        .places
-        .iter()
-        .map(|place| [place.x_m, place.y_m, place.altitude_m])
-        .collect();
-    let own = run("own", 0.01, best.sir, &chain);
+    let places = best.places.iter();
+    let chain = places.map(|place| [place.x_m, place.y_m, place.altitude_m]);
+    (best.sir, chain.collect())
+}
+
+#[test]
+fn chosen_altitudes_count_in_the_sir() {
+    let corridor = Corridor::plane(20.0, 300.0);
+    let (sir, mut chain) = best_beside(corridor);
+    let own = run("own", 0.01, sir, &chain);
     chain[2][2] = 300.5;
-    let high = run("high", 0.01, best.sir, &chain);
+    let high = run("high", 0.01, sir, &chain);
     let text = table(&results("altitudes", 8, &[own, high]));
     assert!(
         text.starts_with("Places and altitudes (`examples/altitudes.toml`):\n"),
@@ -277,20 +280,10 @@ fn chosen_lateral_offsets_count_in_the_sir() {
         right_m: 280.0,
         ..Corridor::plane(20.0, 300.0)
     };
-    let link = Link {
-        y_i: 150.0,
-        min_separation_m: 4.0,
-        ..Link::paper(8)
-    };
-    let best = optimum(&link, corridor, &[]).unwrap().unwrap();
-    let mut chain: Vec<[f64; 3]> = best
-        .places
-        .iter()
-        .map(|place| [place.x_m, place.y_m, place.altitude_m])
-        .collect();
-    let own = run("own", 0.01, best.sir, &chain);
+    let (sir, mut chain) = best_beside(corridor);
+    let own = run("own", 0.01, sir, &chain);
     chain[2][1] = -280.5;
-    let far = run("far", 0.01, best.sir, &chain);
+    let far = run("far", 0.01, sir, &chain);
     let text = table(&results("sides", 8, &[own, far]));
     assert!(text.contains("| 8 | own | 1.543032 | "), "{text}");
     assert!(

@@ -31,6 +31,18 @@ fn json(arguments: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
+/// Returns the report of a run with exit status 1, whose error contains `reason`.
+fn unmet(arguments: &str, reason: &str) -> Value {
+    let output = chain(&format!("--json {arguments}"));
+    assert_eq!(output.status.code(), Some(1), "{arguments}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(
+        report["error"].as_str().unwrap().contains(reason),
+        "{report}"
+    );
+    report
+}
+
 /// Returns the exit status of `cargo chain` with `arguments`, and its only line on standard error.
 fn refusal(arguments: &str) -> (i32, String) {
     let output = chain(arguments);
@@ -146,13 +158,7 @@ fn example(name: &str) -> String {
 
 #[test]
 fn a_chain_without_agreement_gives_status_1_and_a_reason_in_json() {
-    let output = chain("--json --uavs 3 --kill 1@5 --kill 2@5");
-    assert_eq!(output.status.code(), Some(1));
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(
-        report["error"].as_str().unwrap().contains("no quorum"),
-        "{report}"
-    );
+    unmet("--uavs 3 --kill 1@5 --kill 2@5", "no quorum");
 
     // The scenario cannot be changed here, so the error names the option; the JSON has the same message.
     let output = chain("--json --uavs 1000");
@@ -167,16 +173,7 @@ fn a_chain_without_agreement_gives_status_1_and_a_reason_in_json() {
 
 #[test]
 fn a_killed_relay_on_wires_breaks_the_chain_as_reported() {
-    let output = chain("--json --uavs 4 --kill 2@0.01 --wires");
-    assert_eq!(output.status.code(), Some(1));
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(
-        report["error"]
-            .as_str()
-            .unwrap()
-            .contains("relay 2 went silent"),
-        "{report}"
-    );
+    let report = unmet("--uavs 4 --kill 2@0.01 --wires", "relay 2 went silent");
     let silences = report["silences"].as_array().unwrap();
     assert_eq!(silences.len(), 2);
     // Detected by the first probe after 15 s; probes are at most 10 s / 16 apart, plus an eighth.

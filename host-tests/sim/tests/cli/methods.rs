@@ -4,7 +4,7 @@ use serde_json::Value;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
 
-use super::{chain, example, json, refusal};
+use super::{chain, example, json, refusal, unmet};
 
 /// Checks that the method `joint` uses fitted slots: time slots as long as each hop needs. The relays deliver at
 /// least 95 % of the promised data rate. Fitted slots together with rate steps of the radio are rejected.
@@ -201,19 +201,9 @@ fn a_field_is_flown_by_agreement_or_by_measurements() {
 
 #[test]
 fn a_too_large_step_is_reported() {
-    let output = chain(&format!(
-        "--json --scenario {} --method stochastic-step --epsilon 0.2",
-        example("field.toml")
-    ));
-    assert_eq!(output.status.code(), Some(1));
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(
-        report["error"]
-            .as_str()
-            .unwrap()
-            .contains("fixed-step schedule"),
-        "{report}"
-    );
+    let field = example("field.toml");
+    let arguments = format!("--scenario {field} --method stochastic-step --epsilon 0.2");
+    let report = unmet(&arguments, "fixed-step schedule");
     assert!(report.get("best_sir").is_none());
 }
 

@@ -7,7 +7,7 @@ use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_tools::figures::stochastic::{Kind, mission};
 use uav_relay_tools::figures::walk;
 
-use super::{Row, Table, off, within};
+use super::{Row, Table, equals, off, within};
 
 fn link(relays: usize, x_i: f64, y_i: f64, power_w: f64) -> Link {
     Link {
@@ -174,18 +174,8 @@ fn gains_are_relative_to_the_references_baselines() {
     }
     for case in cases::of("baseline_multi").unwrap() {
         let row = table.row(&[("relays", case.arg("N").unwrap())]);
-        assert!(
-            off(
-                row.number("blind_sir_linear"),
-                case.part("chen_sir").unwrap()
-            ) < 1e-7
-        );
-        assert!(
-            off(
-                row.number("equal_sir_linear"),
-                case.part("equal_sir").unwrap()
-            ) < 1e-7
-        );
+        equals(&row, "blind_sir_linear", &case, "chen_sir");
+        equals(&row, "equal_sir_linear", &case, "equal_sir");
     }
     // Results of a separate program with its own random chains.
     for (relays, over_random, over_blind) in [

@@ -16,6 +16,7 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use tempfile::TempDir;
+use uav_relay_oracle::cases::Case;
 
 fn figures(arguments: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_figures"))
@@ -102,6 +103,13 @@ impl Row<'_> {
 
 fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
+}
+
+/// Checks that a number of a row equals a part of a case, by a relative error below 1e-7.
+#[track_caller]
+fn equals(row: &Row, name: &str, case: &Case, part: &str) {
+    let (got, want) = (row.number(name), case.part(part).unwrap());
+    assert!(off(got, want) < 1e-7, "{name}: {got} against {want}");
 }
 
 /// Checks that `got` is between `want` x (1 - `least`) and `want` x (1 + `most`).

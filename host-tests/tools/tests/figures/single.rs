@@ -5,7 +5,7 @@ use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_tools::figures::locus::CHOICES;
 use uav_relay_tools::figures::single::{ALTITUDES_M, REALISATIONS};
 
-use super::{Table, off, within};
+use super::{Table, equals, off, within};
 
 /// Returns the reference model of the paper's dual-hop link (third part of the paper's table).
 fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
@@ -142,18 +142,8 @@ fn the_optimum_and_baselines_agree_with_the_reference() {
             ("relay_w", case.params.p_u),
             ("altitude_m", case.arg("h").unwrap()),
         ]);
-        assert!(
-            off(
-                row.number("blind_sir_linear"),
-                case.part("chen_sir").unwrap()
-            ) < 1e-7
-        );
-        assert!(
-            off(
-                row.number("middle_sir_linear"),
-                case.part("midpoint_sir").unwrap()
-            ) < 1e-7
-        );
+        equals(&row, "blind_sir_linear", &case, "chen_sir");
+        equals(&row, "middle_sir_linear", &case, "midpoint_sir");
     }
 }
 
