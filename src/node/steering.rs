@@ -260,6 +260,15 @@ impl Steering {
         }
     }
 
+    /// Schedules the fence messages to both neighbours again if the neighbour toward Rx has not answered the newest fence.
+    pub(crate) fn repeat_fence(&mut self) {
+        if let Some(wanted) = self.stopped()
+            && let Some(guard) = self.guard().filter(|guard| !guard.is_answered())
+        {
+            guard.commit(wanted);
+        }
+    }
+
     /// Records if the drone follows the setpoints (`flown` is true) or not (false) at the time `now`. Returns true if
     /// this changes the state of the guard.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {

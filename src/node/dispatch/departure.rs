@@ -6,6 +6,7 @@
 //! | event | action |
 //! | --- | --- |
 //! | `wait_as_spare`, or `leave`, before this relay has taken part in anything | go outside, as a spare or as a leaver |
+//! | order to leave | ask both neighbours for a hello, again and again |
 //! | order to leave; both neighbours have selected the relay beyond (the only one at an end) | go outside; keep the setpoint |
 //! | order for the neighbour to leave, received by all | ask the nodes beyond it for a hello; at the end of the chain: give up the neighbour |
 //! | hello of the node beyond the neighbour that is ordered to leave | select it |
@@ -33,6 +34,9 @@ const IN_PLACE_M: f32 = 3.0;
 /// if the neighbours of the relay that leaves do not receive each other. At twice this time after the order, the relay
 /// requests the departure again.
 const BLOCKED_AFTER: u32 = 4;
+
+/// Time after which the last orders are followed again, in units of `hop_time`.
+const REPEATED_AFTER: u32 = 24;
 
 /// State of a relay that leaves the chain or waits outside of it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -84,6 +88,8 @@ pub(crate) struct Leaving {
     spent: bool,
     /// Time of the first order to leave since the request; `None` without an order.
     ordered_at: Option<Instant>,
+    /// Time at which this relay follows the last orders again; 0 if they name no relay and this relay requests nothing.
+    repeat_at: Instant,
     /// Last reported position of the drone; `None` until a position is reported.
     place: Option<Placement>,
     /// Position that the drone must reach to be reported as in place. `None` until the chain has agreed, and while the
@@ -127,6 +133,10 @@ impl Leaving {
     pub(crate) const fn end_order(&mut self) {
         self.ordered_at = None;
         self.passed = [false; 2];
+    }
+
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        Some(self.repeat_at).filter(|at| *at > Instant::ZERO)
     }
 
     /// Returns the spare (relay that waits outside) that this relay has recently received; 0 for none.
@@ -338,6 +348,7 @@ impl Node {
         leaving.end_order();
         for side in [Side::Upstream, Side::Downstream] {
             self.layers.neighbours.at_mut(side).give_up(now, false);
+            self.layers.neighbours.at_mut(side).forget_losses(now);
         }
         if self.layers.round.is_fresh() {
             self.await_first(now);
@@ -415,15 +426,37 @@ impl Node {
         } else {
             self.layers.round.agreed_place()
         };
-        // The fences beside a relay that leaves are as near as its interval of possible positions.
-        let waits = self.layers.leaving.requested
-            && !self.steering.known_guard().is_none_or(Guard::is_still);
+        // The fences beside a relay that leaves are as near as its interval of possible positions, once received.
+        let is_fenced = |guard: &Guard| guard.is_still() && guard.is_answered();
+        let waits =
+            self.layers.leaving.requested && !self.steering.known_guard().is_none_or(is_fenced);
         self.layers.leaving.goal = goal.filter(|_| !self.steering.is_moving() && !waits);
+    }
+
+    /// Follows the last orders again once it is time: on a channel that loses frames, hellos to the relays that they name
+    /// may be lost. Also repeats a fence that has not been answered.
+    pub(super) fn repeat_orders(&mut self, now: Instant) {
+        if self
+            .layers
+            .leaving
+            .next_timeout()
+            .is_some_and(|at| at <= now)
+        {
+            self.follow_orders(now);
+            self.steering.repeat_fence();
+        }
     }
 
     /// Follows the leader's orders in the last lease renewal.
     pub(super) fn follow_orders(&mut self, now: Instant) {
         let orders = self.layers.lease.orders();
+        let leaving = &mut self.layers.leaving;
+        let waits = leaving.requested && !leaving.is_outside();
+        if !(waits || orders.leaver != orders.joiner) {
+            leaving.repeat_at = Instant::ZERO;
+        } else if leaving.repeat_at <= now {
+            leaving.repeat_at = now + self.member.settings.hop_time.times(REPEATED_AFTER);
+        }
         if orders.leaver == self.member.node && self.layers.leaving.requested {
             let blocked = self.member.settings.dead_after.times(2 * BLOCKED_AFTER);
             let at = self.layers.leaving.ordered_at;
@@ -445,8 +478,15 @@ impl Node {
                 self.schedule_hello(side, orders.joiner, true);
             }
             let neighbour = self.layers.neighbours.at(side);
-            let leaves =
-                orders.leaver != 0 && neighbour.node() == orders.leaver && neighbour.is_agreed();
+            let node = neighbour.node();
+            // The neighbour's hello that it has selected the relay beyond may be lost.
+            let asks = self.layers.leaving.ordered_at.is_some()
+                && orders.leaver == self.member.node
+                && !neighbour.has_no_peer();
+            let leaves = orders.leaver != 0 && node == orders.leaver && neighbour.is_agreed();
+            if asks {
+                self.schedule_hello(side, node, true);
+            }
             // Before the renewal has completed, relays beyond may not have the order.
             if !leaves || !self.layers.lease.has_completed() {
                 continue;

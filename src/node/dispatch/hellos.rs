@@ -260,7 +260,9 @@ impl Node {
             && (side == Side::Upstream
                 || self.steering.known_guard().is_none_or(Guard::is_answered));
         let taken = hello.neighbour != own && hello.neighbour != 0 && !farther && !passes;
-        if taken || !hello.is_heard(from, own) {
+        // A neighbour that this relay has passed asks for a hello until it knows: it is not selected again.
+        let leaves = leaver != 0 && leaver == from;
+        if taken || leaves || !hello.is_heard(from, own) {
             return;
         }
         let pairs = hello.neighbour == own;

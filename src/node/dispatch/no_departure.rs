@@ -38,6 +38,10 @@ impl Leaving {
     pub(crate) const fn record_place(self, _: Placement) {}
 
     pub(crate) const fn end_order(self) {}
+
+    pub(crate) const fn next_timeout(self) -> Option<Instant> {
+        None
+    }
 }
 
 impl Layers {
@@ -74,6 +78,8 @@ impl Node {
     }
 
     pub(super) const fn update_goal(&self, _: Option<Placement>) {}
+
+    pub(super) const fn repeat_orders(&self, _: Instant) {}
 
     pub(super) const fn follow_orders(&self, _: Instant) {}
 

@@ -30,6 +30,7 @@ impl Node {
         }
         self.drop_links_if_expired(now);
         self.return_if_expired(now);
+        self.repeat_orders(now);
         for side in [Side::Upstream, Side::Downstream] {
             if self.layers.neighbours.at(side).is_due(now) {
                 self.on_neighbour_timeout(now, side);
@@ -68,6 +69,7 @@ impl Node {
             self.layers.round.next_timeout(),
             self.steering.next_timeout(),
             self.no_quorum_timer.next_timeout(),
+            self.layers.leaving.next_timeout(),
             self.layers.update.next_timeout(),
             self.reporting.next_timeout(self.telemetry_waits()),
         ]

@@ -384,6 +384,12 @@ impl Neighbour {
         }
     }
 
+    /// Forgets earlier losses of links. A relay outside of the chain exchanges few frames with the nodes beside it, so its
+    /// gaps in the reception are no losses.
+    pub(crate) fn forget_losses(&mut self, now: Instant) {
+        self.damping.begin(now);
+    }
+
     /// Schedules hellos that request an answer, to the four nearest nodes on this side of the relay.
     pub(crate) const fn schedule_hellos(&mut self) {
         self.hellos.schedule_all();

@@ -48,6 +48,15 @@ fn run(options: &Options) -> Result<(), Failure> {
             return Err(failure);
         }
     };
+    if let Some(count) = options.hostile.flight.rotation.seeds {
+        let runs = run.rotations(count)?;
+        command::print(&if options.json {
+            command::json(&runs)?
+        } else {
+            runs.table()
+        });
+        return Ok(());
+    }
     if let Some(screen) = screen(options)? {
         let setup = run.setup.clone();
         let mut view = LiveView::new(&setup);

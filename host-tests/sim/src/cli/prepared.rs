@@ -8,7 +8,7 @@ use uav_relay_scenario::{Interference, Scenario};
 
 use super::options::{Method, Options};
 use crate::command::{self, Failure};
-use crate::report::rotation::RotationReport;
+use crate::report::rotation::{RotationFigures, RotationReport, RotationRuns};
 use crate::report::{
     self, AirReport, AllInterferersReport, ChainReport, SensingReport, TrafficReport, timeline,
 };
@@ -56,6 +56,11 @@ impl From<Failure> for Refused {
 
 /// Number of interference samples that each relay takes in one repetition of a `--closed-loop` run.
 const SAMPLES: u32 = 10_000;
+
+/// Returns the largest number of chains that flew at the same time, each by its own agreement.
+fn chains(outcome: &Outcome) -> usize {
+    outcome.watched.map_or(0, |it| it.most_flying)
+}
 
 impl<'a> Prepared<'a> {
     /// Prepares a run from options and a scenario.
@@ -234,7 +239,6 @@ impl<'a> Prepared<'a> {
             ..spec.clone()
         });
         let plain = simulate(plain).map_err(|error| Failure::input(error.to_string()))?;
-        let chains = |outcome: &Outcome| outcome.watched.map_or(0, |it| it.most_flying);
         Ok(Some(RotationReport::new(
             spec,
             (rotated, chains(outcome)),
@@ -243,6 +247,24 @@ impl<'a> Prepared<'a> {
                 .as_ref()
                 .map(|rotated| (rotated, chains(&plain))),
         )))
+    }
+
+    /// Simulates the run with `count` seeds, from its own seed on. The result is empty without a fleet.
+    ///
+    /// # Errors
+    /// A setting that a relay rejects.
+    pub fn rotations(&self, count: u64) -> Result<RotationRuns, Failure> {
+        let mut runs = RotationRuns::default();
+        for seed in (self.setup.seed..).take(usize::try_from(count).unwrap_or(usize::MAX)) {
+            let mut setup = self.setup.clone();
+            setup.seed = seed;
+            let outcome = simulate(setup).map_err(|error| Failure::input(error.to_string()))?;
+            if let (Some(spec), Some(rotated)) = (&self.setup.rotation, &outcome.rotated) {
+                let figures = RotationFigures::new(spec, rotated, chains(&outcome));
+                runs.runs.push((seed, figures));
+            }
+        }
+        Ok(runs)
     }
 
     /// Returns the linear SIR of every hop from Tx to Rx, for the interferer's position at the time `then`.

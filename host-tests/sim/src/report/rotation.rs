@@ -1,11 +1,14 @@
 //! Report of a run in which drones are replaced when their batteries run low.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
 use super::timeline::seconds;
-use crate::simulator::rotation::{GOOD, NearDrone, RESERVE_S, Rotated, RotationSpec};
+use crate::simulator::rotation::{
+    Dip, DipCause, GOOD, NearDrone, RESERVE_S, Rotated, RotationSpec,
+};
 
 /// Result of a run in which drones are replaced when their batteries run low.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -69,10 +72,15 @@ pub struct RotationFigures {
     /// Largest number of chains that flew at the same time, each on an agreement of its own. More than 1 means that the
     /// chain was split.
     pub chains: usize,
+    /// Seconds with an SIR below 0.99 of the optimum, by cause.
+    pub below_s: BTreeMap<DipCause, f64>,
+    /// Each time with an SIR below 0.99 of the optimum.
+    pub dips: Vec<Dip>,
 }
 
 impl RotationFigures {
-    fn new(spec: &RotationSpec, rotated: &Rotated, chains: usize) -> Self {
+    /// Creates the figures of a run. `chains` is the largest number of chains that flew at the same time.
+    pub fn new(spec: &RotationSpec, rotated: &Rotated, chains: usize) -> Self {
         let hours = rotated.watched_s / 3_600.0;
         let left = f64::from(rotated.replaced).max(1.0);
         // The drones' own times in the chain are known: no relay may stay longer than its battery allows.
@@ -94,6 +102,14 @@ impl RotationFigures {
             nearest_at_s: rotated.nearest.as_ref().map(|it| seconds(it.at)),
             nearest: rotated.nearest.as_ref().map(|it| it.drones.clone()),
             chains,
+            below_s: rotated.dips.iter().flat_map(|dip| &dip.causes).fold(
+                BTreeMap::new(),
+                |mut all, (cause, span_s)| {
+                    *all.entry(*cause).or_default() += span_s;
+                    all
+                },
+            ),
+            dips: rotated.dips.clone(),
         }
     }
 }
@@ -116,6 +132,10 @@ impl RotationReport {
         }
     }
 
+    fn figures(&self) -> impl Iterator<Item = &RotationFigures> {
+        std::iter::once(&self.announced).chain(&self.unannounced)
+    }
+
     /// Formats the figures as a table with two columns: announced and unannounced departures.
     pub fn table(&self) -> String {
         let mut text = format!(
@@ -135,6 +155,12 @@ impl RotationReport {
         row(&format!("time below {GOOD} of the optimum, %"), &|it| {
             format!("{:.4}", 100.0 * it.below)
         });
+        let causes = self.figures().flat_map(|it| it.below_s.keys());
+        for cause in causes.collect::<std::collections::BTreeSet<_>>() {
+            row(&format!("  {}, s", cause.name()), &|it| {
+                format!("{:.1}", it.below_s.get(cause).copied().unwrap_or(0.0))
+            });
+        }
         row("lowest SIR of the worst hop, share of the optimum", &|it| {
             some(it.worst, 4)
         });
@@ -169,7 +195,7 @@ impl RotationReport {
         if self.unannounced.is_some() {
             text += "unannounced: a tired drone flies home with its relay off, and a spare in the air is switched on at that moment\n";
         }
-        for figures in std::iter::once(&self.announced).chain(&self.unannounced) {
+        for figures in self.figures() {
             for drone in figures.nearest.iter().flatten() {
                 let [[x, y, h], [to_x, to_y, to_h]] = [drone.at_m, drone.goal_m];
                 _ = writeln!(
@@ -180,5 +206,92 @@ impl RotationReport {
             }
         }
         text
+    }
+}
+
+/// Results of several runs with announced departures, which differ by their seeds.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+pub struct RotationRuns {
+    /// Seed and figures of each run.
+    pub runs: Vec<(u64, RotationFigures)>,
+}
+
+impl RotationRuns {
+    /// Formats one line for each run, and the totals.
+    pub fn table(&self) -> String {
+        let mut text = format!(
+            "{:>8} {:>7} {:>9} {:>7} {:>5} {:>7} {:>8} {:>8} {:>9} {:>8} {:>7}\n",
+            "seed",
+            "hours",
+            "below, %",
+            "lowest",
+            "left",
+            "forced",
+            "per hour",
+            "computed",
+            "least, s",
+            "near, m",
+            "chains"
+        );
+        let mut line = |seed: &str, it: &RotationFigures| {
+            let lowest = it.worst.unwrap_or(f64::NAN);
+            let [left_s, near_m] =
+                [it.least_left_s, it.nearest_m].map(|it| it.unwrap_or(f64::INFINITY));
+            let hours = it.watched_s / 3_600.0;
+            _ = writeln!(
+                text,
+                "{seed:>8} {hours:>7.2} {:>9.4} {lowest:>7.3} {:>5} {:>7} {:>8.2} {:>8.2} {left_s:>9.1} {near_m:>8.2} {:>7}",
+                100.0 * it.below,
+                it.replaced,
+                it.forced,
+                it.per_hour,
+                it.arithmetic_per_hour,
+                it.chains
+            );
+        };
+        for (seed, figures) in &self.runs {
+            line(&seed.to_string(), figures);
+        }
+        let all = self.total();
+        line("all", &all);
+        for (cause, span_s) in &all.below_s {
+            _ = writeln!(text, "below {GOOD}, {}: {span_s:.1} s", cause.name());
+        }
+        text
+    }
+
+    /// Returns the figures of all runs together: sums, averages by time, and extreme values.
+    fn total(&self) -> RotationFigures {
+        let all = || self.runs.iter().map(|(_, figures)| figures);
+        let watched_s: f64 = all().map(|it| it.watched_s).sum();
+        let mean = |of: &dyn Fn(&RotationFigures) -> f64| {
+            all().map(|it| of(it) * it.watched_s).sum::<f64>() / watched_s.max(1e-9)
+        };
+        let least =
+            |of: &dyn Fn(&RotationFigures) -> Option<f64>| all().filter_map(of).reduce(f64::min);
+        let mut below_s = BTreeMap::new();
+        for (cause, span_s) in all().flat_map(|it| &it.below_s) {
+            *below_s.entry(*cause).or_default() += span_s;
+        }
+        RotationFigures {
+            complete_at_s: None,
+            watched_s,
+            below: mean(&|it| it.below),
+            worst: least(&|it| it.worst),
+            worst_at_s: None,
+            replaced: all().map(|it| it.replaced).sum(),
+            forced: all().map(|it| it.forced).sum(),
+            per_hour: mean(&|it| it.per_hour),
+            arithmetic_per_hour: mean(&|it| it.arithmetic_per_hour),
+            mean_wait_s: mean(&|it| it.mean_wait_s),
+            longest_wait_s: all().map(|it| it.longest_wait_s).fold(0.0, f64::max),
+            least_left_s: least(&|it| it.least_left_s),
+            nearest_m: least(&|it| it.nearest_m),
+            nearest_at_s: None,
+            nearest: None,
+            chains: all().map(|it| it.chains).max().unwrap_or(0),
+            below_s,
+            dips: Vec::new(),
+        }
     }
 }

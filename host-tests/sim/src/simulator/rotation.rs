@@ -4,7 +4,7 @@
 //! the same side have altitudes of their own. A spare waits beside the line at 1.25 spacings of the pilots, and keeps its altitude, a
 //! spacing from that of any other spare, until its relay has flown it into the line.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use serde::Serialize;
 use uav_relay::{Duration, Instant};
@@ -121,6 +121,67 @@ pub struct Rotated {
     pub least_left_s: Option<f64>,
     /// Closest approach of two drones in the air since the start.
     pub nearest: Option<Encounter>,
+    /// Times since `complete_at` in which the worst hop's SIR was below [`GOOD`] of the optimum.
+    pub dips: Vec<Dip>,
+}
+
+/// Time in which the worst hop's SIR is below [`GOOD`] of the optimum.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Dip {
+    /// Time at which it begins, s.
+    pub at_s: f64,
+    /// Duration, s.
+    pub span_s: f64,
+    /// Time at which it ends. Without a gap, the next step of the flight extends it.
+    #[serde(skip)]
+    pub until: Instant,
+    /// Part of the duration for each cause, s.
+    pub causes: BTreeMap<DipCause, f64>,
+    /// Smallest SIR of the worst hop, as a fraction of the optimum.
+    pub least: f64,
+    /// State of the chain at the time of the smallest SIR.
+    pub worst: DipState,
+}
+
+/// State of the chain during a [`Dip`].
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct DipState {
+    /// The two nodes of the worst hop: 0 is Tx, and the number of drones plus 1 is Rx.
+    pub hop: [usize; 2],
+    /// All drones with their relays on, except for those on their way home.
+    pub drones: Vec<NearDrone>,
+}
+
+/// Cause of a low SIR: the first one of the list that applies.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DipCause {
+    /// Fewer relays in the chain than are meant to fly, and no spare waits beside the line.
+    NoSpare,
+    /// Fewer relays in the chain than are meant to fly, and a spare waits beside the line.
+    SpareWaits,
+    /// The relays in the chain are not all in one view with a lease and agreed positions.
+    Agreement,
+    /// The guard of a relay keeps its drone off the agreed position.
+    Guard,
+    /// The drones fly to their agreed positions.
+    Motion,
+    /// All relays are at their agreed positions.
+    Positions,
+}
+
+impl DipCause {
+    /// Returns the cause in words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoSpare => "too few relays, no spare",
+            Self::SpareWaits => "too few relays, a spare waits",
+            Self::Agreement => "view, lease or positions not agreed",
+            Self::Guard => "guard keeps a drone off its position",
+            Self::Motion => "drones fly to their positions",
+            Self::Positions => "agreed positions",
+        }
+    }
 }
 
 /// Closest approach of two drones, and their states at that time.
@@ -134,7 +195,7 @@ pub struct Encounter {
     pub drones: [NearDrone; 2],
 }
 
-/// Drone of an [`Encounter`].
+/// Drone of an [`Encounter`] or a [`Dip`].
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct NearDrone {
     /// Number of the drone's relay.
@@ -249,8 +310,14 @@ impl Rotation {
 
     /// Records that the SIR was the fraction `share` of the optimum for the time `span` up to `now`.
     ///
-    /// Does nothing before the chain was complete for the first time.
-    pub(super) fn count(&mut self, now: Instant, span: Duration, share: f64) {
+    /// Does nothing before the chain was complete for the first time. `dip` is the cause of a low SIR and the state of the chain.
+    pub(super) fn count(
+        &mut self,
+        now: Instant,
+        span: Duration,
+        share: f64,
+        dip: Option<(DipCause, DipState)>,
+    ) {
         let record = &mut self.record;
         if record.complete_at.is_none() {
             return;
@@ -260,8 +327,31 @@ impl Rotation {
         if record.worst.is_none_or(|(worst, _)| share < worst) {
             record.worst = Some((share, now));
         }
-        if share < GOOD {
-            record.below_s += span_s;
+        let Some((cause, state)) = dip else {
+            return;
+        };
+        record.below_s += span_s;
+        let begun = now.since(Instant::ZERO + span);
+        let continues = |dip: &Dip| dip.until.since(Instant::ZERO) >= begun;
+        if !record.dips.last().is_some_and(continues) {
+            record.dips.push(Dip {
+                at_s: begun.as_micros() as f64 / 1e6,
+                span_s: 0.0,
+                until: now,
+                causes: BTreeMap::new(),
+                least: f64::INFINITY,
+                worst: state.clone(),
+            });
+        }
+        let Some(dip) = record.dips.last_mut() else {
+            return;
+        };
+        dip.until = now;
+        dip.span_s += span_s;
+        *dip.causes.entry(cause).or_default() += span_s;
+        if share < dip.least {
+            dip.least = share;
+            dip.worst = state;
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Replacement of drones whose batteries run low.
 
+use serde_json::Value;
+
 use super::json;
 
 /// Minimum separation of the default scenario, m.
@@ -25,5 +27,57 @@ fn a_fleet_of_twelve_replaces_its_tired_drones() {
         assert!(announced["below"].as_f64().unwrap() < 0.02, "{figures}");
         let nearest_m = announced["nearest_m"].as_f64().unwrap();
         assert!(nearest_m >= SEPARATION_M - 2.0 * ERROR_M, "{figures}");
+    }
+}
+
+/// Checks chains of two sizes for eight hours on channels that lose none, 30 % and half of the frames.
+///
+/// The seeds are fixed, so that the test cannot fail by chance.
+#[test]
+fn a_fleet_replaces_its_tired_drones_on_a_channel_that_loses_frames() {
+    // Flying drones, share of lost frames, and limits: share of the time with a low SIR, drones without permission.
+    let runs = [
+        (6, 4, 0.0, 0.001, 0),
+        (6, 4, 0.3, 0.005, 0),
+        (6, 4, 0.5, 0.03, 0),
+        (12, 8, 0.3, 0.03, 0),
+        (12, 8, 0.5, 0.2, 4),
+    ];
+    for (fleet, flying, loss, most_below, most_forced) in runs {
+        let report = json(&format!(
+            "--fly --fleet {fleet} --flying {flying} --soak 3600 --seed 1 --seeds 2 --loss {loss}"
+        ));
+        for run in report["runs"].as_array().unwrap() {
+            let figures = &run[1];
+            let what = format!("{fleet}/{flying}, loss {loss}, seed {}", run[0]);
+            assert_eq!(figures["chains"], 1, "{what}: {figures}");
+            let forced = figures["forced"].as_u64().unwrap();
+            assert!(forced <= most_forced, "{what}: {figures}");
+            let below = figures["below"].as_f64().unwrap();
+            assert!(below < most_below, "{what}: {figures}");
+            let nearest_m = figures["nearest_m"].as_f64().unwrap();
+            assert!(
+                nearest_m >= SEPARATION_M - 2.0 * ERROR_M,
+                "{what}: {figures}"
+            );
+            // Each time with a low SIR is listed, with its causes.
+            let spans = |of: &Value, key: &str| of[key].as_f64().unwrap();
+            let dips = figures["dips"].as_array().unwrap();
+            let listed_s: f64 = dips.iter().map(|dip| spans(dip, "span_s")).sum();
+            let watched_s = spans(figures, "watched_s");
+            assert!(
+                (listed_s - below * watched_s).abs() < 1e-3,
+                "{what}: {listed_s}"
+            );
+            for dip in dips {
+                let causes = dip["causes"].as_object().unwrap().values();
+                let caused_s: f64 = causes.map(|span_s| span_s.as_f64().unwrap()).sum();
+                assert!(
+                    (caused_s - spans(dip, "span_s")).abs() < 1e-3,
+                    "{what}: {dip}"
+                );
+                assert!(spans(dip, "least") < 0.99, "{what}: {dip}");
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Replacement of drones whose batteries run low: pilots, spares, returns, and the measured SIR.
 
 use rand::RngExt;
-use uav_relay::{Departure, Duration, HoldReason, Instant, Side};
+use uav_relay::{Departure, Duration, HoldReason, Instant, Relay, Side};
 
 use super::{Chain, ChangedRelays, QueuedEvent};
 use crate::report::{hop_sirs, hop_sirs_back};
@@ -10,10 +10,10 @@ use crate::simulator::drones::{
 };
 use crate::simulator::outcome::TimelineEvent;
 use crate::simulator::rotation::{
-    Battery, CLIMB_MPS, Duty, Encounter, MOVING, NearDrone, Rotated, Rotation, RotationSpec,
-    SPEED_MPS, duration,
+    Battery, CLIMB_MPS, DipCause, DipState, Duty, Encounter, GOOD, MOVING, NearDrone, Rotated,
+    Rotation, RotationSpec, SPEED_MPS, duration,
 };
-use crate::simulator::watch::{has_agreed, undisturbed};
+use crate::simulator::watch::{ObservedState, has_agreed, undisturbed};
 
 /// Time step of the simulation while a drone moves.
 const STEP: Duration = Duration::from_millis(100);
@@ -119,20 +119,20 @@ impl Chain {
             spacing_m: (separation_m + 2.0 * (spec.bias_m + spec.noise_m) + 2.0).max(8.0),
             record: Rotated::default(),
         };
-        rotation.best = self.worst_hop(&places);
+        (rotation.best, _) = self.worst_hop(&places);
         self.flight = Some(flight);
         self.rotation = Some(rotation);
         self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
     }
 
-    /// Returns the linear SIR of the worst hop of a chain of relays at `places`, in order from Tx. The result is 0
-    /// without any relay.
-    fn worst_hop(&self, places: &[Point]) -> f64 {
+    /// Returns the linear SIR of the worst hop over relays at `places`, in order from Tx, and the number of that hop,
+    /// from 0. The SIR is 0 without any relay.
+    fn worst_hop(&self, places: &[Point]) -> (f64, usize) {
         let mission = &self.setup.mission;
         let common = mission.config().common;
         let route: Vec<_> = places.iter().map(|at| (placement(*at), common)).collect();
         if route.is_empty() {
-            return 0.0;
+            return (0.0, 0);
         }
         let reverse = f64::from(mission.reverse());
         let back = if reverse > 0.0 {
@@ -141,17 +141,19 @@ impl Chain {
             Vec::new()
         };
         let sirs = hop_sirs(mission, &route);
-        let all = sirs
-            .into_iter()
-            .chain(back.into_iter().map(|sir| sir / reverse));
-        all.fold(f64::INFINITY, f64::min)
+        let back = back.into_iter().map(|sir| sir / reverse);
+        let all = sirs.into_iter().enumerate().chain(back.enumerate());
+        let all = all.map(|(hop, sir)| (sir, hop));
+        all.min_by(|one, other| one.0.total_cmp(&other.0))
+            .unwrap_or((0.0, 0))
     }
 
     /// Returns the linear SIR of the chain's worst hop at present, if the data take the best route.
     ///
     /// The route may leave out up to six relays that are about to leave or have just joined. Constant position errors
-    /// do not count: the positions are the drones' own estimates, without noise.
-    fn served(&self, rotation: &Rotation, flight: &Flight) -> f64 {
+    /// do not count: the positions are the drones' own estimates, without noise. The second value is the worst hop: the
+    /// numbers of its two nodes.
+    fn served(&self, rotation: &Rotation, flight: &Flight) -> (f64, [usize; 2]) {
         let mut fixed = Vec::new();
         let mut optional = Vec::new();
         for (index, (member, drone)) in self.members.iter().zip(&rotation.drones).enumerate() {
@@ -174,10 +176,73 @@ impl Chain {
             let mut route = fixed.clone();
             route.extend(some.map(|(_, one)| *one));
             route.sort_by_key(|(index, _)| *index);
-            let places: Vec<Point> = route.into_iter().map(|(_, at)| at).collect();
-            self.worst_hop(&places)
+            let places: Vec<Point> = route.iter().map(|(_, at)| *at).collect();
+            let (sir, hop) = self.worst_hop(&places);
+            let end = rotation.drones.len() + 1;
+            let node = |at: usize| match at.checked_sub(1) {
+                None => 0,
+                Some(at) => route.get(at).map_or(end, |(index, _)| index + 1),
+            };
+            (sir, [hop, hop + 1].map(node))
         });
-        routes.fold(0.0, f64::max)
+        routes.fold(
+            (0.0, [0; 2]),
+            |best, route| {
+                if route.0 > best.0 { route } else { best }
+            },
+        )
+    }
+
+    /// Returns the cause of a low SIR now, and the state of the chain. `hop` is the worst hop.
+    fn dip(&self, rotation: &Rotation, flight: &Flight, hop: [usize; 2]) -> (DipCause, DipState) {
+        let on: Vec<(usize, &Duty)> = self
+            .members
+            .iter()
+            .zip(&rotation.drones)
+            .enumerate()
+            .filter(|(_, (member, _))| member.killed.is_none())
+            .map(|(index, (_, drone))| (index, &drone.duty))
+            .collect();
+        let serving = || {
+            let serving = on.iter().filter(|(_, duty)| **duty == Duty::Serving);
+            serving.filter_map(|(index, _)| Some((*index, &self.members.get(*index)?.relay)))
+        };
+        let stays = |relay: &Relay| {
+            let departure = relay.departure(self.now);
+            departure != Departure::Outside && departure != Departure::Free
+        };
+        let is_off = |index: usize, relay: &Relay| {
+            let at = flight.drones.get(index).map(Drone::estimated_position);
+            let agreed = relay.agreed_place().map(point);
+            at.zip(agreed)
+                .is_none_or(|(at, agreed)| apart(at, agreed) > ARRIVED_M)
+        };
+        let is_held = |relay: &Relay| {
+            let sides = [Side::Upstream, Side::Downstream];
+            sides.iter().any(|side| relay.hold_reason(*side).is_some())
+        };
+        let in_chain = serving().filter(|(_, relay)| stays(relay)).count();
+        let cause = if in_chain < usize::from(rotation.spec.flying) {
+            if on.iter().any(|(_, duty)| **duty == Duty::Standby) {
+                DipCause::SpareWaits
+            } else {
+                DipCause::NoSpare
+            }
+        } else if !self.is_whole(rotation) {
+            DipCause::Agreement
+        } else if serving().any(|(index, relay)| is_held(relay) && is_off(index, relay)) {
+            DipCause::Guard
+        } else if serving().any(|(index, relay)| is_off(index, relay)) {
+            DipCause::Motion
+        } else {
+            DipCause::Positions
+        };
+        let drones = on
+            .iter()
+            .filter(|(_, duty)| !matches!(duty, Duty::Home { .. }))
+            .map(|(index, _)| self.near_drone(rotation, flight, *index))
+            .collect();
+        (cause, DipState { hop, drones })
     }
 
     /// Brings forward the next step of the flight if the setpoint of relay `index` (from 0) has changed.
@@ -266,7 +331,8 @@ impl Chain {
 
     fn record(&mut self, rotation: &mut Rotation, flight: &Flight, span: Duration) {
         let now = self.now;
-        let share = self.served(rotation, flight) / rotation.best;
+        let (sir, hop) = self.served(rotation, flight);
+        let share = sir / rotation.best;
         let serving = rotation.drones.iter().filter(|it| it.duty == Duty::Serving);
         if rotation.record.complete_at.is_none()
             && serving.count() >= usize::from(rotation.spec.flying)
@@ -275,7 +341,8 @@ impl Chain {
         {
             rotation.record.complete_at = Some(now);
         }
-        rotation.count(now, span, share);
+        let dip = (share < GOOD).then(|| self.dip(rotation, flight, hop));
+        rotation.count(now, span, share, dip);
         let air = rotation.drones.iter().zip(&flight.drones).enumerate();
         let air: Vec<(usize, Point)> = air
             .filter(|(_, (battery, _))| !matches!(battery.duty, Duty::Ground(_)))
@@ -299,7 +366,7 @@ impl Chain {
         }
     }
 
-    /// Describes drone `index` (from 0) for the record of a closest approach.
+    /// Describes drone `index` (from 0) for the record of a closest approach or a low SIR.
     fn near_drone(&self, rotation: &Rotation, flight: &Flight, index: usize) -> NearDrone {
         let duty = match rotation.drones.get(index).map(|it| &it.duty) {
             Some(Duty::Rising { .. }) => "on its way to its place beside the line",
@@ -317,9 +384,14 @@ impl Chain {
                     .map_or("none".to_owned(), |it| format!("{it:?}"))
             });
             let [up, down] = holds;
+            let seen = ObservedState::of(relay, true);
+            let lease = if seen.leased { "lease" } else { "no lease" };
             format!(
-                "{:?}; reason to wait: {up} toward Tx, {down} toward Rx",
-                relay.departure(self.now)
+                "{:?}; view {} of {} relays, {:?}, {lease}; reason to wait: {up} toward Tx, {down} toward Rx",
+                relay.departure(self.now),
+                seen.view.number(),
+                seen.relays,
+                seen.phase,
             )
         });
         let drone = flight.drones.get(index);
@@ -342,7 +414,7 @@ impl Chain {
                     && member.killed.is_none()
                     && member.relay.departure(self.now) != Departure::Outside
             })
-            .map(|(member, _)| crate::simulator::watch::ObservedState::of(&member.relay, true))
+            .map(|(member, _)| ObservedState::of(&member.relay, true))
             .collect();
         let leased = on.iter().all(|one| one.leased);
         let same = on.windows(2).all(|pair| match pair {
