@@ -260,7 +260,9 @@ impl Steering {
         }
     }
 
-    /// Schedules the fence messages to both neighbours again if the neighbour toward Rx has not answered the newest fence.
+    /// Schedules the fence messages to both neighbours again.
+    ///
+    /// No effect if the neighbour toward Rx has answered the newest fence.
     pub(crate) fn repeat_fence(&mut self) {
         if let Some(wanted) = self.stopped()
             && let Some(guard) = self.guard().filter(|guard| !guard.is_answered())

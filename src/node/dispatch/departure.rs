@@ -88,7 +88,9 @@ pub(crate) struct Leaving {
     spent: bool,
     /// Time of the first order to leave since the request; `None` without an order.
     ordered_at: Option<Instant>,
-    /// Time at which this relay follows the last orders again; 0 if they name no relay and this relay requests nothing.
+    /// Time at which this relay follows the last orders again.
+    ///
+    /// It is 0 if the orders name no relay and this relay requests nothing.
     repeat_at: Instant,
     /// Last reported position of the drone; `None` until a position is reported.
     place: Option<Placement>,
@@ -433,8 +435,9 @@ impl Node {
         self.layers.leaving.goal = goal.filter(|_| !self.steering.is_moving() && !waits);
     }
 
-    /// Follows the last orders again once it is time: on a channel that loses frames, hellos to the relays that they name
-    /// may be lost. Also repeats a fence that has not been answered.
+    /// Follows the last orders again once it is time, and repeats a fence that has not been answered.
+    ///
+    /// Reason: on a channel that loses frames, hellos to the relays that the orders name may be lost.
     pub(super) fn repeat_orders(&mut self, now: Instant) {
         if self
             .layers

@@ -198,7 +198,7 @@ pub(super) struct Fitted<const RELAYS: usize> {
     /// of all hops from Tx to each relay are stored here instead: the time toward Rx in place of x, and the time toward
     /// Tx in place of y.
     best_places: [Triple; RELAYS],
-    /// For each of a relay's five tried positions: the best choice among those of the previous relay. The previous
+    /// Best choice among the positions of the previous relay, for each of a relay's five tried positions. The previous
     /// relay is the one toward Tx. A choice is an index in [`MOVES`], and takes three bits.
     choices: [u16; RELAYS],
     front: [State; STATES],

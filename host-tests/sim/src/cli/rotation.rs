@@ -24,8 +24,8 @@ pub struct Rotation {
     /// Time on the ground until the battery is full again, s, 0 to 1e5; default 180
     #[arg(long, value_name = "S", requires = "fleet", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5))]
     ground_time: Option<f64>,
-    /// Simulate K runs with announced departures only, 1 to 10000: the seeds are --seed and the numbers that follow. Prints a line a
-    /// run, and the totals
+    /// Simulate K runs with announced departures only, 1 to 10000, and print a line a run, and the totals.
+    /// The seeds are --seed and the numbers that follow
     #[arg(long, value_name = "K", requires = "fleet", conflicts_with_all = ["svg", "capture", "address"], value_parser = whole(1_u64, 10_000))]
     pub seeds: Option<u64>,
 }

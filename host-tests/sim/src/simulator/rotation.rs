@@ -148,7 +148,7 @@ pub struct Dip {
 pub struct DipState {
     /// The two nodes of the worst hop: 0 is Tx, and the number of drones plus 1 is Rx.
     pub hop: [usize; 2],
-    /// All drones with their relays on, except for those on their way home.
+    /// Drones with their relays on, except for those on their way home.
     pub drones: Vec<NearDrone>,
 }
 
@@ -166,7 +166,7 @@ pub enum DipCause {
     Guard,
     /// The drones fly to their agreed positions.
     Motion,
-    /// All relays are at their agreed positions.
+    /// The relays are all at their agreed positions.
     Positions,
 }
 

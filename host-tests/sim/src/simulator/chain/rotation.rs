@@ -125,8 +125,9 @@ impl Chain {
         self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
     }
 
-    /// Returns the linear SIR of the worst hop over relays at `places`, in order from Tx, and the number of that hop,
-    /// from 0. The SIR is 0 without any relay.
+    /// Returns the linear SIR of the worst hop over relays at `places`, and the number of that hop.
+    ///
+    /// The places are in order from Tx, and the hops have the numbers from 0. The SIR is 0 without any relay.
     fn worst_hop(&self, places: &[Point]) -> (f64, usize) {
         let mission = &self.setup.mission;
         let common = mission.config().common;
