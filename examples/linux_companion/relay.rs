@@ -108,7 +108,7 @@ impl Flight {
         let views = options.view_file.as_deref();
         let views = views.map(|file| records::resume_views(file, &mut relay, now));
         let (mut views, has_votes) = views.transpose()?.unzip();
-        // After the view record: it shows if this relay has taken part in the chain.
+        // After `resume_view`, as `wait_as_spare` requires.
         if options.battery.spare {
             relay.wait_as_spare(now);
         }

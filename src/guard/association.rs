@@ -135,6 +135,22 @@ impl Association {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
 
+    /// Returns the reason why the neighbour at `side`, without an association (session), stops this relay.
+    ///
+    /// It is `Lost` if the neighbour is not linked because of a lost drone in `keep_out`, otherwise `Unheard`.
+    pub(super) fn unpaired_reason(&self, side: Side, keep_out: &KeepOut, own: &Own) -> HoldReason {
+        if keep_out.bars(side, self.node, self.seen_m(), &own.config) {
+            HoldReason::Lost
+        } else {
+            HoldReason::Unheard
+        }
+    }
+
+    /// Returns the x of the neighbour's last message with its x, m; NaN without such a message.
+    pub(super) const fn last_m(&self) -> f32 {
+        self.seen_m
+    }
+
     pub(super) const fn is_absent(&self) -> bool {
         self.left_number != 0
     }
@@ -442,22 +458,11 @@ impl KeepOut {
     }
 
     /// Returns the obstacles to keep when the line from Tx to Rx changes: the lost relays. A drone that does not fly to
-    /// setpoints is not kept, because its x along the new line is unknown.
+    /// setpoints is not kept, and no last x of a lost relay, because the x along the new line are unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
+        self.known_m = f32::NAN;
         self
-    }
-
-    /// Returns the reason why a neighbour without an association (session) stops this relay.
-    ///
-    /// The reason is `Lost` if there is a lost drone on this side, which the neighbour may have to pass. Otherwise it
-    /// is `Unheard`.
-    pub(super) const fn unpaired_reason(&self) -> HoldReason {
-        if self.has_lost() {
-            HoldReason::Lost
-        } else {
-            HoldReason::Unheard
-        }
     }
 
     /// Returns `HoldReason::NotFlown` if the neighbour `node` does not follow setpoints, else `otherwise`.

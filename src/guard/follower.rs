@@ -61,7 +61,9 @@ impl FenceFollower {
         }
         let before = self.association.node;
         if node < before && !self.association.has_no_flown_neighbour() && self.has_fence() {
-            let x_m = self.fence_m - self.requested_m.min(own.config.separation_m);
+            // Its fence and its agreed position are known, but not where it is on its way.
+            let most_m = self.fence_m - self.requested_m.min(own.config.separation_m);
+            let x_m = most_m.min(self.target_m);
             self.keep_out.record_lost_x(Side::Upstream, before, x_m);
         }
         self.renew(own, jitter);
@@ -333,7 +335,10 @@ impl FenceFollower {
             return Some(HoldReason::Order);
         }
         if !self.has_fence() {
-            return Some(self.keep_out.unpaired_reason());
+            return Some(
+                self.association
+                    .unpaired_reason(Side::Upstream, &self.keep_out, own),
+            );
         }
         let step_m = target_m - self.target_m + own.config.rounding();
         (step_m < self.agreed_m.min(own.config.separation_m)).then_some(HoldReason::Close)

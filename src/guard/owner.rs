@@ -64,8 +64,11 @@ impl FenceOwner {
         }
         let before = self.association.node;
         let is_lost = node == 0 || node > before;
-        if is_lost && !self.association.has_no_flown_neighbour() && self.has_reply() {
-            let x_m = self.follower_low_m;
+        if is_lost && !self.association.has_no_flown_neighbour() && self.follower_low_m.is_finite()
+        {
+            // Its last known x, or on its way to its agreed position, but not before the last fence that it has passed.
+            let last_m = self.association.last_m().min(self.target_m);
+            let x_m = last_m.max(self.follower_low_m);
             self.keep_out.record_lost_x(Side::Downstream, before, x_m);
         }
         self.renew(own, jitter);
@@ -451,7 +454,10 @@ impl FenceOwner {
             return None;
         }
         if !self.has_reply() {
-            return Some(self.keep_out.unpaired_reason());
+            return Some(
+                self.association
+                    .unpaired_reason(Side::Downstream, &self.keep_out, own),
+            );
         }
         if !self.is_beyond(own) {
             return Some(HoldReason::Order);

@@ -652,7 +652,7 @@ impl Reporting {
         let (own, all, byte) = match settings.wiring {
             Wiring::Pair => (wires, wires, hop),
             Wiring::Shared => {
-                let most = micros(settings.probe_after) / (235 * relays);
+                let most = micros(settings.probe_after) / (235 * relays).max(1);
                 let own = load(member, member.relays_to_end(side));
                 (own, all_loads(member), hop.min(most.into()))
             }
@@ -660,7 +660,7 @@ impl Reporting {
         let is_both = self.watched.iter().all(|watched| now < watched.until);
         let byte = if is_both { byte * 5 / 2 } else { byte };
         let period = u64::from(all) * byte;
-        let byte = Duration::from_micros(period / u64::from(own));
+        let byte = Duration::from_micros(period / u64::from(own.max(1)));
         (Duration::from_micros(period).max(LEAST_PERIOD), byte)
     }
 }

@@ -230,6 +230,22 @@ fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
         one.guard.forget(Side::Downstream, false);
         assert_eq!(talk(&mut one).to_bits(), 200.0_f32.to_bits(), "{x_m}");
     }
+    // Relay 3 has arrived at 300 m, far beyond its fence, when it is lost: relay 2 is on the right side.
+    let mut one = One::new([None, Some(3)], 100.0, 100.0);
+    let mut lost = One::new([Some(1), None], 300.0, 300.0);
+    for _ in 0..4 {
+        lost.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+        one.receive(Side::Downstream, 3, lost.sent(Side::Upstream));
+    }
+    one.guard.set_neighbour(Side::Downstream, Some(4));
+    one.guard.set_neighbour(Side::Downstream, Some(2));
+    let mut fresh = One::new([Some(1), None], 240.0, 200.0);
+    for _ in 0..4 {
+        fresh.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+        one.receive(Side::Downstream, 2, fresh.sent(Side::Upstream));
+    }
+    assert_eq!(fresh.setpoint().to_bits(), 200.0_f32.to_bits());
+    assert!(!one.guard.has_lost(Side::Downstream));
     // Relay 2 is lost at 300 m: relay 3 joins between it and relay 4.
     for (x_m, joins) in [(280.0, false), (299.0, false), (301.0, true), (350.0, true)] {
         let mut last = One::new([Some(2), None], 500.0, 200.0);
