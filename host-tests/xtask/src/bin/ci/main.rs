@@ -2,7 +2,7 @@
 //!
 //! The steps run in three sequences (lanes) at the same time. Steps with the same target folder are in the main lane.
 //! Steps with a target folder of their own are in a second lane, at low priority. Tests that mostly wait for the wall
-//! clock run beside both, at the highest priority. At its end each step prints its wall time and its processor time.
+//! clock are in a third lane.
 
 mod prepare;
 mod steps;
@@ -110,21 +110,15 @@ fn run<'a>(
     let Step { name, command, .. } = step;
     _ = writeln!(out, "\n== {number}/{all} {name}: {command}");
     let begun = Instant::now();
-    let result = step.run(out);
+    let failure = step.run(out).err();
+    let result = if failure.is_none() {
+        "passed"
+    } else {
+        "FAILED"
+    };
     let seconds = begun.elapsed().as_secs();
-    match result {
-        Ok(processor) => {
-            let processor = processor.map_or(String::new(), |processor| {
-                format!(", {} s of processor time", processor.as_secs())
-            });
-            _ = writeln!(out, "== {name} passed in {seconds} s{processor}");
-            None
-        }
-        Err(evidence) => {
-            _ = writeln!(out, "== {name} FAILED in {seconds} s");
-            Some((&**name, evidence))
-        }
-    }
+    _ = writeln!(out, "== {name} {result} in {seconds} s");
+    failure.map(|evidence| (&**name, evidence))
 }
 
 /// Number of last output lines that are repeated at the end for a failed step without tests.

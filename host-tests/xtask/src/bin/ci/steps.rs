@@ -3,7 +3,6 @@
 use std::io::{BufReader, Error, PipeReader, Write, pipe};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
-use std::time::Duration;
 
 use super::Evidence;
 
@@ -56,7 +55,7 @@ const QUICK_TESTS: [&str; 10] = [
 pub(crate) struct Step {
     pub(crate) name: String,
     pub(crate) command: String,
-    environment: Environment,
+    environment: &'static [(&'static str, &'static str)],
     pub(crate) lane: Lane,
 }
 
@@ -65,24 +64,13 @@ pub(crate) struct Step {
 pub(crate) enum Lane {
     /// Main lane: its steps run one after the other.
     Main,
-    /// Lane of steps that mostly wait for the wall clock, at the highest priority.
+    /// Lane of steps that mostly wait for the wall clock.
     ///
     /// Other steps do not delay them.
     /// Such a step starts after the previous step of the main lane. The main lane then continues at once.
     Waiting,
     /// Lane of steps at low priority, one after the other, each with a target folder of its own.
     Background,
-}
-
-impl Lane {
-    /// Returns the arguments of `nice` for a step. Five levels are a third of the processor time of a competitor.
-    const fn niceness(self) -> &'static str {
-        match self {
-            Self::Waiting => "0",
-            Self::Main => "5",
-            Self::Background => "15",
-        }
-    }
 }
 
 /// Nightly compiler for the fuzzer and for Miri.
@@ -124,22 +112,21 @@ fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
 }
 
 impl Step {
-    /// Runs the step's command, and copies its standard output to `out`. Returns the processor time.
+    /// Runs the step's command, and copies its standard output to `out`.
     ///
     /// In a lane other than the main lane, the error output goes to `out` as well; in the main lane, to this program's
     /// error output.
     ///
     /// # Errors
     /// The relevant output, if the command fails.
-    pub(crate) fn run(&self, out: &mut impl Write) -> Result<Option<Duration>, Evidence> {
+    pub(crate) fn run(&self, out: &mut impl Write) -> Result<(), Evidence> {
         let mut evidence = Evidence::default();
         let passed = self.start().and_then(|(mut child, output)| {
             evidence.read(BufReader::new(output), out)?;
-            let time = processor_time(&child);
-            Ok((child.wait()?, time))
+            child.wait()
         });
         match passed {
-            Ok((status, time)) if status.success() => Ok(time),
+            Ok(status) if status.success() => Ok(()),
             Ok(_) => Err(evidence),
             Err(error) => {
                 evidence.add(&format!("{}: {error}", self.command));
@@ -151,37 +138,21 @@ impl Step {
     /// Starts the step's command. Returns its process, and the pipe with its output.
     fn start(&self) -> Result<(Child, PipeReader), Error> {
         let (reader, writer) = pipe()?;
-        let mut command = Command::new("nice");
-        command.args(["-n", self.lane.niceness()]);
-        command.args(self.command.split_whitespace());
-        command.envs(self.environment.iter().copied());
+        let priority = if self.lane == Lane::Background {
+            "nice -n 10 "
+        } else {
+            ""
+        };
+        let line = format!("{priority}{}", self.command);
+        let mut words = line.split_whitespace();
+        let mut command = Command::new(words.next().unwrap_or("cargo"));
+        command.args(words).envs(self.environment.iter().copied());
         if self.lane != Lane::Main {
             command.stderr(writer.try_clone()?);
         }
         let child = command.stdout(writer).spawn()?;
         Ok((child, reader))
     }
-}
-
-/// Waits until `child` has ended. Returns its processor time and that of its descendants.
-///
-/// Without Linux's `/proc` it returns `None`.
-fn processor_time(child: &Child) -> Option<Duration> {
-    /// Unit of the times in `/proc`, ms.
-    const TICK: u64 = 10;
-    #[cfg(target_os = "linux")]
-    {
-        use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
-        // The process stays in the table of processes, with its times.
-        let stays = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
-        waitid(WaitId::Pid(Pid::from_child(child)), stays).ok()?;
-    }
-    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
-    let (_, after_name) = stat.rsplit_once(')')?;
-    // Fields 14 to 17: times of the process, and of the descendants that were waited for, each as user and as system.
-    let times = after_name.split_whitespace().skip(11).take(4);
-    let ticks: u64 = times.filter_map(|time| time.parse::<u64>().ok()).sum();
-    Some(Duration::from_millis(ticks * TICK))
 }
 
 /// Returns the steps of the quick check, in order.
@@ -258,55 +229,38 @@ pub(crate) fn all() -> Vec<Step> {
     steps
 }
 
-/// Integration tests that mostly wait for the wall clock.
-///
-/// Each has the name of its step, the name of the test, and its environment.
-/// `RUST_TEST_THREADS` is the number of tests at a time. It may exceed the number of cores: each test uses a few per cent of a core.
-/// The tests of firmware images run one fleet with fast clocks at a time, and the three fleets in real time beside it.
-const WAITING_TESTS: [(&str, &str, Environment); 3] = [
-    (
-        "tests of companions",
-        "companion",
-        &[("PROGRAMS", "built"), ("RUST_TEST_THREADS", "6")],
-    ),
-    (
-        "tests of firmware images",
-        "qemu",
-        &[("PROGRAMS", "built"), ("RUST_TEST_THREADS", "4")],
-    ),
-    (
-        "tests of pages in a browser",
-        "browser",
-        &[("PROGRAMS", "built")],
-    ),
-];
+/// Integration test that mostly waits for the wall clock.
+const WAITING_TEST: &str = "companion";
 
-/// Variables of a step's environment, with their values.
-type Environment = &'static [(&'static str, &'static str)];
+/// Number of tests of [`WAITING_TEST`] that run at a time.
+///
+/// The number may exceed that of the cores, because each test uses a few per cent of a core.
+const WAITING_TESTS: &str = "6";
 
 /// Returns the steps that build all programs and tests of the workspace, and run the tests.
 ///
 /// All of these steps select the whole workspace. Cargo enables the features that any selected package needs of a
 /// dependency. A step with another selection of packages would compile most packages once more.
 fn workspace_tests() -> Vec<Step> {
-    let waits = |name: &String| WAITING_TESTS.iter().any(|(_, test, _)| name == test);
     let others: Vec<String> = integration_tests()
         .into_iter()
-        .filter(|name| !waits(name))
-        .map(|name| format!(" --test {name}"))
+        .filter(|test| test != WAITING_TEST)
+        .map(|test| format!(" --test {test}"))
         .collect();
     let test = "cargo test --workspace --no-fail-fast --locked";
-    let waiting = WAITING_TESTS.map(|(name, binary, environment)| Step {
-        lane: Lane::Waiting,
-        environment,
-        ..step(name, format!("{test} --test {binary}"))
-    });
-    let mut steps = vec![step(
-        "all programs and tests, built",
-        "cargo build --workspace --all-targets --locked",
-    )];
-    steps.extend(waiting);
-    steps.extend([
+    vec![
+        step(
+            "all programs and tests, built",
+            "cargo build --workspace --all-targets --locked",
+        ),
+        Step {
+            lane: Lane::Waiting,
+            environment: &[("PROGRAMS", "built"), ("RUST_TEST_THREADS", WAITING_TESTS)],
+            ..step(
+                "tests of companions",
+                format!("{test} --test {WAITING_TEST}"),
+            )
+        },
         Step {
             environment: &[("PROGRAMS", "built")],
             ..step("tests", format!("{test} --lib --bins{}", others.concat()))
@@ -315,8 +269,7 @@ fn workspace_tests() -> Vec<Step> {
             "examples in the documentation",
             "cargo test --workspace --no-fail-fast --locked --doc",
         ),
-    ]);
-    steps
+    ]
 }
 
 /// Returns the names of all integration tests of the workspace, sorted.
@@ -507,9 +460,8 @@ fn nightly() -> Vec<Step> {
 #[cfg(test)]
 mod tests {
     use std::process::Command;
-    use std::time::Duration;
 
-    use super::{Lane, Step, all, fuzz_targets, integration_tests, quick, step};
+    use super::{Lane, Step, WAITING_TEST, all, fuzz_targets, integration_tests, quick, step};
 
     #[test]
     fn a_failed_background_step_is_reported_with_its_output() {
@@ -524,15 +476,6 @@ mod tests {
     }
 
     #[test]
-    #[cfg(target_os = "linux")]
-    fn a_step_counts_the_processor_time_of_its_descendants() {
-        let adds = "timeout 60 python3 -c sum(range(10_000_000))";
-        let ran = step("sum", adds).run(&mut Vec::new());
-        let time = ran.ok().flatten().unwrap();
-        assert!(time >= Duration::from_millis(50), "{time:?}");
-    }
-
-    #[test]
     fn steps_in_the_background_have_a_target_folder_of_their_own() {
         for step in all().iter().filter(|step| step.lane == Lane::Background) {
             let command = &*step.command;
@@ -540,19 +483,6 @@ mod tests {
             assert!(is_apart || command.contains(" fmt "), "{command}");
         }
         assert!(quick().iter().all(|step| step.lane == Lane::Main));
-    }
-
-    #[test]
-    fn every_integration_test_is_in_one_step() {
-        for name in integration_tests() {
-            let argument = format!(" --test {name} ");
-            let all = all();
-            let with_it = all
-                .iter()
-                .filter(|step| step.command.starts_with("cargo test --workspace"))
-                .filter(|step| format!("{} ", step.command).contains(&argument));
-            assert_eq!(with_it.count(), 1, "{name}");
-        }
     }
 
     #[test]
@@ -570,7 +500,7 @@ mod tests {
     #[test]
     fn every_integration_test_of_the_workspace_is_listed() {
         let listed = integration_tests();
-        for name in ["browser", "chain", "cli", "companion", "qemu", "wireshark"] {
+        for name in [WAITING_TEST, "browser", "chain", "cli", "qemu", "wireshark"] {
             assert!(
                 listed.iter().any(|test| test == name),
                 "{name} of {listed:?}"
