@@ -87,9 +87,7 @@ fn lines_of(lines: &[Line], drone: u16) -> usize {
     lines.iter().filter(|line| line.drone == drone).count()
 }
 
-/// Lock that permits one fleet with fast clocks at a time, so that the clocks keep up with their speed.
-///
-/// Drones in real time mostly sleep, so their fleets run beside others.
+/// Lock that permits one fleet at a time, so that the drones' clocks keep up with real time.
 static AIR: Mutex<()> = Mutex::new(());
 
 /// Running emulated drones of one flight.
@@ -103,7 +101,7 @@ pub(crate) struct Fleet {
     new: Receiver<Line>,
     pub(crate) lines: Vec<Line>,
     _folder: tempfile::TempDir,
-    _air: Option<MutexGuard<'static, ()>>,
+    _air: MutexGuard<'static, ()>,
 }
 
 impl Fleet {
@@ -143,9 +141,8 @@ impl Fleet {
         seed: u64,
         life: Life,
     ) -> Self {
+        let air = AIR.lock().unwrap_or_else(PoisonError::into_inner);
         let (file, table) = (image(which.name()), table(which));
-        let alone = || AIR.lock().unwrap_or_else(PoisonError::into_inner);
-        let air = (life == Life::Fast).then(alone);
         let folder = tempfile::Builder::new().prefix("fleet").tempdir().unwrap();
         let (lines, new) = channel();
         let (mut drones, mut consoles, mut ports) = (Vec::new(), Vec::new(), Vec::new());
