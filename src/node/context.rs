@@ -5,8 +5,7 @@ use crate::mission::{Band, Interference, Mission};
 use crate::node::circulation::Path;
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
-use crate::side::Heading;
-use crate::side::Side;
+use crate::side::{Heading, Side};
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::digest::{MissionId, digest};
@@ -222,6 +221,10 @@ impl OtherLeases {
         }
     }
 }
+
+/// State that this relay reports about itself. The values are the number of the state in an entry (without the control
+/// state), its [refusals](crate::wire::message::Entry::refusal) toward Tx and toward Rx, the setpoint, and the agreed position.
+pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
 /// Results of one protocol layer's step, for the other layers and the firmware.
 #[expect(

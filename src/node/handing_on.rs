@@ -9,8 +9,7 @@
     reason = "the same interface as that of `reports`"
 )]
 
-use super::context::Member;
-use super::dispatch::Own;
+use super::context::{Member, Own};
 use super::neighbour::Neighbours;
 use crate::features::AUTH;
 use crate::place::Placement;

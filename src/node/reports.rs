@@ -19,8 +19,7 @@ use core::num::NonZeroU16;
 
 use heapless::Vec;
 
-use super::context::Member;
-use super::dispatch::Own;
+use super::context::{Member, Own};
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
 use crate::flight::autopilot::state::State;

@@ -150,7 +150,7 @@ fn a_member_adds_its_vote() {
 
 /// Checks that the last relay decides for an earlier view if relays may have agreed on it already.
 ///
-/// As in Paxos, the view of the latest accepted proposal is proposed again. A view is the agreed membership of the
+/// The view of the latest accepted proposal is proposed again, as in Paxos. A view is the agreed membership of the
 /// chain.
 #[test]
 fn a_possibly_decided_view_is_proposed_again() {

@@ -455,7 +455,8 @@ impl Node {
         let orders = self.layers.lease.orders();
         let leaving = &mut self.layers.leaving;
         let waits = leaving.requested && !leaving.is_outside();
-        if !(waits || orders.leaver != orders.joiner) {
+        let names_relay = orders.leaver != 0 || orders.joiner != 0;
+        if !waits && !names_relay {
             leaving.repeat_at = Instant::ZERO;
         } else if leaving.repeat_at <= now {
             leaving.repeat_at = now + self.member.settings.hop_time.times(REPEATED_AFTER);

@@ -18,7 +18,6 @@
 //! parts, such as 1 - 3 - 5 and 2 - 4, would keep their links forever. A part that has not selected the node toward the
 //! rest of the chain would keep its links as well. A part without a quorum loses nothing by dropping its links.
 
-pub(crate) use self::telemetry::Own;
 use crate::event::{Event, NodeEvent, Pending};
 use crate::features::SENSING;
 use crate::geodetic::Sites;

@@ -2,8 +2,8 @@
 
 use super::Node;
 use crate::features::{AUTH, TELEMETRY};
+use crate::node::context::Own;
 use crate::node::round::state::Phase;
-use crate::place::Placement;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
@@ -15,10 +15,6 @@ const PATIENCE: Duration = Duration::from_millis(2_000);
 
 /// Maximum time by which telemetry waits on a shared channel during the first agreement.
 const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
-
-/// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), its [refusals](crate::wire::message::Entry::refusal) toward Tx and toward Rx, the setpoint, and the agreed position.
-pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
 impl Node {
     /// Handles a telemetry message of node `from` at `side`: a Watch (request for reports) or a Report. The node need
