@@ -89,6 +89,7 @@ mod root;
 pub mod root;
 pub mod sensing;
 pub mod serial;
+mod serial_number;
 mod settings;
 mod side;
 #[cfg(not(feature = "internals"))]

@@ -13,6 +13,7 @@ use crate::features::TELEMETRY;
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::sensing::sums::is_level;
+use crate::serial_number::next_nonzero;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::{Stats, bump};
@@ -161,10 +162,7 @@ impl Ground {
     pub fn request_flown(&mut self, now: Instant) {
         self.cancel();
         self.flown = None;
-        self.query_number = match self.query_number.wrapping_add(1) {
-            0 => 1,
-            number => number,
-        };
+        self.query_number = next_nonzero(self.query_number);
         self.start(now);
     }
 

@@ -4,12 +4,9 @@ use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
 use super::own::Own;
 use crate::place::{CrossSection, Placement};
+use crate::serial_number::is_newer;
 use crate::side::Side;
 use crate::time::Jitter;
-
-/// Half of the range of 16-bit fence numbers, which wrap around. A received fence (limit of x between two relays) is
-/// newer than the stored one if its number minus the stored number, modulo 2^16, is above 0 and below this value.
-const AHEAD: u16 = 0x8000;
 
 /// State of the fence toward Tx: the plane x = constant that is a lower limit of this relay's x. The upstream neighbour
 /// sets it.
@@ -168,8 +165,7 @@ impl FenceFollower {
         }
         self.association.receive_open(fence);
         (self.target_m, self.across) = (fence.target_m, fence.across);
-        let ahead = fence.number.wrapping_sub(self.number);
-        if fence.number != 0 && (self.number == 0 || (1..AHEAD).contains(&ahead)) {
+        if fence.number != 0 && (self.number == 0 || is_newer(fence.number, self.number)) {
             if self.number == 0 {
                 self.keep_out
                     .on_fence(Side::Upstream, self.association.node);

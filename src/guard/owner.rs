@@ -5,6 +5,7 @@ use super::association::{Fence, HoldReason};
 use super::own::Own;
 use crate::features::DEPARTURES;
 use crate::place::{CrossSection, Placement};
+use crate::serial_number::next_nonzero;
 use crate::side::Side;
 use crate::time::Jitter;
 
@@ -414,10 +415,7 @@ impl FenceOwner {
         if let Some((x_m, step_m, _)) =
             proposed.filter(|(x_m, step_m, _)| moves && self.is_new_fence(own, *x_m, *step_m))
         {
-            self.number = match self.number.wrapping_add(1) {
-                0 => 1,
-                number => number,
-            };
+            self.number = next_nonzero(self.number);
             self.fence_m = x_m;
             self.requested_m = step_m;
             self.agreed_m = self.agreed_m.max(step_m);

@@ -98,8 +98,10 @@ pub(crate) struct Context<'a> {
     /// Identifier of the newest mission that this relay has stored. The stored mission can be newer than the active
     /// one.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last one: it has no neighbour on the side away from the leader.
-    pub(crate) end: bool,
+    /// True if this relay is the last one that the leader reaches.
+    ///
+    /// It has no neighbour on the side away from the leader. The view can have further members.
+    pub(crate) is_last_reachable: bool,
     /// Remaining lease times of other relays. Until these leases have ended, no relay may use the positions of a new
     /// view.
     pub(crate) other_leases: OtherLeases,
@@ -126,7 +128,7 @@ impl<'a> Context<'a> {
     ///
     /// The settings must select the joint method. The relays must be free to choose a lateral offset or an altitude, or
     /// the mission must have fitted slots. Fitted slots are time slots that are as long as each hop needs.
-    pub(crate) fn joins(&self) -> bool {
+    pub(crate) fn solves_jointly(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
         let free = !is_line || self.mission().fitted_gap() > 0.0;
@@ -138,11 +140,13 @@ impl<'a> Context<'a> {
         tenths(longest_lease(self.settings()))
     }
 
-    pub(crate) fn leads(&self) -> bool {
+    /// Returns true if this relay is the leader of the accepted view.
+    pub(crate) fn leads_view(&self) -> bool {
         self.index() == self.mission().leader()
     }
 
-    pub(crate) fn is_last(&self) -> bool {
+    /// Returns true if this relay is the last member of the accepted view. The first member is the leader.
+    pub(crate) fn is_last_of_view(&self) -> bool {
         self.mission().after(self.index()).is_none()
     }
 

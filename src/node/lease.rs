@@ -388,7 +388,7 @@ impl Lease {
     fn join_renewal(&mut self, context: &Context<'_>, number: u16, span: u16) {
         self.current = Some(Current { number, span });
         self.circulation.start(context.now);
-        if context.is_last() {
+        if context.is_last_of_view() {
             self.complete_renewal(context, None);
         }
     }
@@ -424,7 +424,7 @@ impl Lease {
             .max(context.now + from_tenths(current.span));
         self.circulation
             .complete(context.now, context.path_to_leader());
-        if !context.leads() {
+        if !context.leads_view() {
             return;
         }
         // The period counts from the start of a renewal. So after a slow renewal the next one follows after only a

@@ -6,8 +6,8 @@
 //! a granted view have its mission. A relay that misses the decision, or loses the mission, cannot take part in
 //! anything before it flies that mission too.
 //!
-//! An offer repeats the number of a recent hello of its receiver. The number changes after `dead_after`. The current
-//! and the previous number are valid until twice `dead_after` after their last use. So an offer that was recorded or
+//! An offer repeats the nonce of a recent hello of its receiver. The nonce changes after `dead_after`. The current
+//! and the previous nonce are valid until twice `dead_after` after their last use. So an offer that was recorded or
 //! withheld is worthless later, although its tag is right.
 //!
 //! A relay that has an offer to make, but no recent hello of the neighbour, sends a hello that requests one. Offers are
@@ -34,6 +34,7 @@ use crate::features::UPLOAD;
 use crate::geodetic::{LineError, Sites};
 use crate::guard::config::Geofence;
 use crate::mission::{Band, Mission, MissionConfig};
+use crate::serial_number::next_nonzero;
 use crate::side::Side;
 use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
@@ -43,8 +44,8 @@ use crate::wire::upload::{Upload, UploadError, check_line};
 ///
 /// A mission offer to this relay must repeat the nonce. So an old recording of an offer is recognised.
 #[derive(Clone, Copy, Debug)]
-struct Asked {
-    number: u16,
+struct HelloNonce {
+    nonce: u16,
     first: Instant,
     last: Instant,
 }
@@ -63,9 +64,9 @@ struct Offering {
     /// Number of offers sent since the mission or the neighbour last changed.
     tries: u8,
     /// True if a hello to the ground station on this side is pending.
-    reports: bool,
-    /// Number of the ground station's request for the uploaded mission, repeated in the reply. 0 without a request.
-    ground_asks: u16,
+    ground_hello_due: bool,
+    /// Nonce of the ground station's request for the uploaded mission, repeated in the reply. 0 without a request.
+    ground_nonce: u16,
 }
 
 impl Offering {
@@ -75,8 +76,8 @@ impl Offering {
         is_due: false,
         at: None,
         tries: 0,
-        reports: false,
-        ground_asks: 0,
+        ground_hello_due: false,
+        ground_nonce: 0,
     };
 }
 
@@ -123,7 +124,7 @@ struct Uploads {
     /// Last mission that this relay or any other relay has refused; `None` if there is none.
     refused: Option<MissionId>,
     /// Current and previous nonce (random number) in this relay's hellos. A mission offer must repeat either nonce.
-    asked: [Asked; 2],
+    hello_nonces: [HelloNonce; 2],
     /// Mission offers to the neighbour toward Tx and to the neighbour toward Rx.
     offering: [Offering; 2],
     jitter: Jitter,
@@ -136,8 +137,8 @@ pub(crate) const fn accepts_uploads(member: &Member) -> bool {
 
 impl MissionUpdate {
     pub(crate) fn new(member: &Member, seed: u32, now: Instant) -> Self {
-        let asked = Asked {
-            number: Jitter::new(seed).number(),
+        let current = HelloNonce {
+            nonce: Jitter::new(seed).number(),
             first: now,
             last: now,
         };
@@ -148,7 +149,13 @@ impl MissionUpdate {
             loaded_m: loaded.distance_m,
             loaded_band: altitudes_of(loaded),
             refused: None,
-            asked: [asked, Asked { number: 0, ..asked }],
+            hello_nonces: [
+                current,
+                HelloNonce {
+                    nonce: 0,
+                    ..current
+                },
+            ],
             offering: [Offering::NONE; 2],
             jitter: Jitter::new(seed),
         };
@@ -177,31 +184,31 @@ impl MissionUpdate {
 
     /// Returns the nonce for the next hello, which a mission offer must repeat. 0 if this relay accepts no uploads. The
     /// nonce changes every `dead_after`.
-    pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
+    pub(crate) fn next_hello_nonce(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
         let Some(uploads) = uploads.filter(|_| accepts_uploads(member)) else {
             return 0;
         };
-        let [current, before] = &mut uploads.asked;
+        let [current, before] = &mut uploads.hello_nonces;
         if now.since(current.first) >= member.settings.dead_after {
             *before = *current;
-            current.number = match current.number.wrapping_add(1) {
-                0 => 1,
-                number => number,
-            };
+            current.nonce = next_nonzero(current.nonce);
             current.first = now;
         }
         current.last = now;
-        current.number
+        current.nonce
     }
 
-    /// Returns true if the nonce `answer` of a mission offer was in a recent hello of this relay.
+    /// Returns true if the `nonce` of a mission offer was in a recent hello of this relay.
     ///
     /// Recent means within the last two periods of `dead_after`.
-    pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
+    pub(crate) fn is_recent_nonce(&self, nonce: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
-        let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
-        answer != 0 && self.uploads().is_some_and(|it| it.asked.iter().any(is_it))
+        let is_it = |own: &HelloNonce| own.nonce == nonce && now.since(own.last) <= span;
+        nonce != 0
+            && self
+                .uploads()
+                .is_some_and(|it| it.hello_nonces.iter().any(is_it))
     }
 
     fn offering(&mut self, side: Side) -> Option<&mut Offering> {
@@ -213,7 +220,7 @@ impl MissionUpdate {
     }
 
     /// Records the nonce in a hello of the neighbour at `side`. The next mission offer repeats this nonce.
-    pub(crate) fn record_hello_number(&mut self, side: Side, nonce: u16, now: Instant) {
+    pub(crate) fn record_neighbour_nonce(&mut self, side: Side, nonce: u16, now: Instant) {
         if let Some(offering) = self.offering(side) {
             offering.nonce = nonce;
             offering.heard = Some(now);
@@ -241,8 +248,8 @@ impl MissionUpdate {
 
     /// Returns the pending mission offer to the neighbour `to` at `side`, and marks it as sent.
     ///
-    /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The returned number is the
-    /// nonce of the neighbour's hello, which the offer repeats. The number is `None` if the hello is older than half of
+    /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The result has the
+    /// nonce of the neighbour's hello, which the offer repeats. The nonce is `None` if the hello is older than half of
     /// `dead_after`. Then the caller must first request a new hello.
     pub(crate) fn poll_offer(
         &mut self,
@@ -285,25 +292,25 @@ impl MissionUpdate {
 
     /// Schedules replies to the ground station at `side`.
     ///
-    /// A hello is scheduled if `reports` is true, and the stored upload if `asks` has the number of a request for it.
-    pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
+    /// A hello is scheduled if `hello` is true, and the stored upload if `nonce` is that of a request for it.
+    pub(crate) fn answer_ground(&mut self, side: Side, hello: bool, nonce: Option<u16>) {
         if let Some(offering) = self.offering(side) {
-            offering.reports |= reports;
-            offering.ground_asks = asks.unwrap_or(offering.ground_asks);
+            offering.ground_hello_due |= hello;
+            offering.ground_nonce = nonce.unwrap_or(offering.ground_nonce);
         }
     }
 
     /// Returns true if a hello to the ground station at `side` is pending, and marks it as sent.
-    pub(crate) fn poll_report(&mut self, side: Side) -> bool {
+    pub(crate) fn poll_ground_hello(&mut self, side: Side) -> bool {
         let offering = self.offering(side);
-        offering.is_some_and(|offering| core::mem::take(&mut offering.reports))
+        offering.is_some_and(|offering| core::mem::take(&mut offering.ground_hello_due))
     }
 
-    /// Returns the upload that the ground station at `side` has requested, and the number of the request. `None`
+    /// Returns the upload that the ground station at `side` has requested, and the nonce of the request. `None`
     /// without a request, or without a stored upload.
     pub(crate) fn poll_requested(&mut self, side: Side) -> Option<(Upload, u16)> {
-        let answer = core::mem::take(&mut self.offering(side)?.ground_asks);
-        Some((*self.upload().filter(|_| answer != 0)?, answer))
+        let nonce = core::mem::take(&mut self.offering(side)?.ground_nonce);
+        Some((*self.upload().filter(|_| nonce != 0)?, nonce))
     }
 
     /// Returns the last refused mission. `None` if no mission was refused, if the refused mission is `active`, or if

@@ -25,6 +25,7 @@ use super::neighbour::hearing::{CANDIDATES, mask};
 use crate::flight::autopilot::state::State;
 use crate::mission::MAX_RELAYS;
 use crate::place::Placement;
+use crate::serial_number::is_newer;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::telemetry::REFUSED;
@@ -408,13 +409,13 @@ impl Reporting {
         let watched = self.at(side);
         watched.expire(now, member);
         let begins = watched.until == Instant::ZERO;
-        let ahead = number.wrapping_sub(watched.number);
+        let is_next = begins || is_newer(number, watched.number);
         if begins {
             watched.due = now;
             watched.own_from = now;
             watched.count = 0;
         }
-        if begins || (1..0x8000).contains(&ahead) {
+        if is_next {
             watched.number = number;
             watched.until = now + WATCHED;
             // The station sends to several relays at once.
@@ -428,7 +429,7 @@ impl Reporting {
             if !is_pair && !is_direct {
                 watched.hand_on |= mask(CANDIDATES);
             }
-        } else if ahead != 0 {
+        } else if number != watched.number {
             return;
         }
         let distance = |node: u16| node.abs_diff(member.node);
@@ -467,8 +468,7 @@ impl Reporting {
         if from.abs_diff(member.node) == CANDIDATES {
             (watched.confirmed, watched.unconfirmed) = (now, 0);
         }
-        let missed = watched.number.wrapping_sub(report.number());
-        if (1..0x8000).contains(&missed) && now >= watched.hand_on_at + REPEAT_AFTER {
+        if is_newer(watched.number, report.number()) && now >= watched.hand_on_at + REPEAT_AFTER {
             watched.hand_on_at = now;
             let is_far = from.abs_diff(member.node) == CANDIDATES;
             watched.hand_on |= mask(if is_far { CANDIDATES } else { 1 });

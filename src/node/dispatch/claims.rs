@@ -151,7 +151,7 @@ impl Node {
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();
-        if !self.layers.round.is_fresh() {
+        if !self.layers.round.is_idle() {
             self.layers.round.suspend();
             self.layers.view.leave(now);
         }

@@ -250,7 +250,7 @@ impl Node {
     fn is_untouched(&self) -> bool {
         let Layers { round, view, .. } = &self.layers;
         let is_loaded = self.member.view == ViewId::LOADED && view.outstanding().is_none();
-        round.is_fresh() || is_loaded && round.is_untouched()
+        round.is_idle() || is_loaded && round.is_untouched()
     }
 
     /// Cancels this relay's request to leave. Returns false, and does nothing, if the leader has already ordered the
@@ -322,7 +322,7 @@ impl Node {
         // A relay that has just started knows no neighbours: it counts as an end only if there is no number beyond.
         let ends = [self.member.node == 1, self.member.node == self.member.all];
         let fresh = self.is_untouched();
-        if fresh && !self.layers.round.is_fresh() {
+        if fresh && !self.layers.round.is_idle() {
             self.layers.round.cancel_work();
         }
         self.layers.leaving.ended = [0, 1].map(|at: usize| {
@@ -352,7 +352,7 @@ impl Node {
             self.layers.neighbours.at_mut(side).give_up(now, false);
             self.layers.neighbours.at_mut(side).forget_losses(now);
         }
-        if self.layers.round.is_fresh() {
+        if self.layers.round.is_idle() {
             self.await_first(now);
         } else {
             self.layers.view.request.request_now(now);

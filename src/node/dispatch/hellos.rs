@@ -43,7 +43,7 @@ impl Node {
                 };
                 let to = self.member.beyond(side, distance);
                 if self.member.is_relay(to) && self.side_of(to).is_some() {
-                    let offer_number = self.layers.update.next_offer_number(now, &self.member);
+                    let offer_number = self.layers.update.next_hello_nonce(now, &self.member);
                     let mut hello = self.hello(now, side, ask, offer_number);
                     if hello.outside {
                         hello.ready = self.layers.leaving.is_spare();
@@ -69,7 +69,7 @@ impl Node {
             neighbour: self.layers.neighbours.at(side).node(),
             requests_reply: ask,
             requests_view: self.layers.view.request.is_pending() && side == self.back(),
-            fresh: self.layers.round.is_fresh() || self.layers.leaving.is_outside(),
+            fresh: self.layers.round.is_idle() || self.layers.leaving.is_outside(),
             ready: false,
             behind: self.relays_through(side.other()),
             hears: self
@@ -136,7 +136,7 @@ impl Node {
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. A relay that the view leaves out still has its
         // count from the view before, although no neighbour selects it.
-        if self.layers.round.is_fresh() || !self.layers.neighbours.at(far).is_mutual() {
+        if self.layers.round.is_idle() || !self.layers.neighbours.at(far).is_mutual() {
             1
         } else {
             self.relays_on(far).saturating_add(1)
@@ -186,7 +186,7 @@ impl Node {
         if self.layers.neighbours.at(side).node() == from {
             self.layers
                 .update
-                .record_hello_number(side, hello.offer_number, now);
+                .record_neighbour_nonce(side, hello.offer_number, now);
             if hello.refused {
                 self.on_refused(side, hello.latest_mission);
             } else {
@@ -284,7 +284,7 @@ impl Node {
             neighbour.latest_mission = Some(hello.latest_mission);
             layers
                 .update
-                .record_hello_number(side, hello.offer_number, now);
+                .record_neighbour_nonce(side, hello.offer_number, now);
             layers.update.reset_offers(side);
             self.steering.set_neighbour(side, Some(from));
             if tells {

@@ -201,7 +201,7 @@ impl Node {
             }
             Some(LayerEvent::Converged) => {
                 self.raise(Event::Converged);
-                let leads = self.layers.context(now, &self.member).leads();
+                let leads = self.layers.context(now, &self.member).leads_view();
                 self.layers.lease.on_agreement(now, leads);
             }
             Some(LayerEvent::Infeasible) => self.raise(Event::Infeasible),
@@ -356,7 +356,7 @@ impl Layers {
             now,
             member,
             latest: self.update.latest(),
-            end: self.neighbours.at(onward).has_no_peer(),
+            is_last_reachable: self.neighbours.at(onward).has_no_peer(),
             other_leases: self.lease.other_leases(now),
         }
     }
@@ -479,7 +479,7 @@ impl Node {
             if let Some(offer) = self.next_offer(now, side) {
                 return Some(offer);
             }
-            if let Some((to, report)) = self.next_report(now, side) {
+            if let Some((to, report)) = self.next_for_ground(now, side) {
                 return Some((side, to, report));
             }
         }

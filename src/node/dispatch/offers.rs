@@ -32,17 +32,17 @@ impl Node {
                 upload,
                 offer_number,
             } => {
-                if self.is_asked(now, *offer_number) {
+                if self.check_nonce(now, *offer_number) {
                     self.store_upload(now, upload);
                 }
                 self.layers.update.answer_ground(side, true, None);
             }
             Message::Hello(hello) => {
                 let is_older = hello.latest_mission < self.layers.update.latest();
-                let asks = is_older.then_some(hello.offer_number);
+                let requested = is_older.then_some(hello.offer_number);
                 self.layers
                     .update
-                    .answer_ground(side, hello.requests_reply, asks);
+                    .answer_ground(side, hello.requests_reply, requested);
             }
             Message::Level { power_w, .. } => self.handle_sample(
                 now,
@@ -60,9 +60,9 @@ impl Node {
     /// Returns the next message for the ground station at `side`, with the station's node number.
     ///
     /// The message is a hello or the requested upload; `None` if neither is pending.
-    pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
+    pub(super) fn next_for_ground(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
         let to = self.member.station(side);
-        if !self.layers.update.poll_report(side) {
+        if !self.layers.update.poll_ground_hello(side) {
             let (upload, offer_number) = self.layers.update.poll_requested(side)?;
             return Some((
                 to,
@@ -72,7 +72,7 @@ impl Node {
                 },
             ));
         }
-        let offer_number = self.layers.update.next_offer_number(now, &self.member);
+        let offer_number = self.layers.update.next_hello_nonce(now, &self.member);
         let hello = Hello {
             neighbour: 0,
             requests_view: false,
@@ -81,17 +81,13 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `offer_number` is the nonce (random number) of a recent hello of this relay. Otherwise the offer
-    /// is counted as stale.
-    fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
-        let asked = self
-            .layers
-            .update
-            .is_recent_number(offer_number, now, &self.member);
-        if !asked {
+    /// Returns true if `nonce` was in a recent hello of this relay. Otherwise counts the offer as stale.
+    fn check_nonce(&mut self, now: Instant, nonce: u16) -> bool {
+        let is_recent = self.layers.update.is_recent_nonce(nonce, now, &self.member);
+        if !is_recent {
             bump(&mut self.telemetry.stats.stale);
         }
-        asked
+        is_recent
     }
 
     /// Handles a mission offer from node `from` at `side`. The node has loaded the same mission before flight.
@@ -110,7 +106,7 @@ impl Node {
         if !accepts_uploads(&self.member) {
             return bump(&mut self.telemetry.stats.unsigned);
         }
-        if !self.is_asked(now, offer_number) {
+        if !self.check_nonce(now, offer_number) {
             return self.schedule_hello(side, from, false);
         }
         let id = upload.id();
@@ -231,7 +227,7 @@ impl Node {
                 offer_number,
             }
         } else {
-            let offer_number = update.next_offer_number(now, &self.member);
+            let offer_number = update.next_hello_nonce(now, &self.member);
             Message::Hello(self.hello(now, side, true, offer_number))
         };
         Some((side, to, message))

@@ -122,7 +122,7 @@ fn proposal(mission_id: MissionId) -> Message {
 
 /// Returns a valid mission offer to `node`. It repeats the number of a hello that `node` sends at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
-    let offer_number = node.layers.update.next_offer_number(NOW, &node.member);
+    let offer_number = node.layers.update.next_hello_nonce(NOW, &node.member);
     Message::Offer {
         upload,
         offer_number,
@@ -326,11 +326,11 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
                 let step = Settings::default().dead_after;
                 node.layers
                     .update
-                    .next_offer_number(NOW + step, &node.member);
+                    .next_hello_nonce(NOW + step, &node.member);
                 node.layers
                     .update
-                    .next_offer_number(NOW + step.times(2), &node.member);
-                node.layers.update.next_offer_number(now, &node.member);
+                    .next_hello_nonce(NOW + step.times(2), &node.member);
+                node.layers.update.next_hello_nonce(now, &node.member);
             }
             let from = u16::from(!ground);
             assert!(node.handle_message(now, Side::Upstream, from, &withheld));

@@ -45,10 +45,10 @@ impl Node {
                 self.await_first(now);
             }
         } else {
-            let leads = self.layers.neighbours.at(self.back()).has_no_peer();
-            let fresh = self.layers.round.is_fresh();
+            let is_first = self.layers.neighbours.at(self.back()).has_no_peer();
+            let fresh = self.layers.round.is_idle();
             let context = self.layers.context(now, &self.member);
-            let effects = self.layers.view.handle_timeout(&context, leads, fresh);
+            let effects = self.layers.view.handle_timeout(&context, is_first, fresh);
             self.apply(now, effects);
         }
         self.layers.update.handle_timeout(now);
@@ -143,7 +143,7 @@ impl Node {
 
     /// Returns true until this relay's first message along the chain or view request.
     fn awaits_first(&self) -> bool {
-        self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
+        self.layers.round.is_idle() && !self.layers.view.request.is_pending()
     }
 
     /// Starts the timer for the first message along the chain. If the timer expires, the relay requests a new view.

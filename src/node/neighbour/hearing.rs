@@ -39,12 +39,72 @@ impl ConsecutiveCounts {
     }
 }
 
+/// Bit mask whose bits expire: each remains set for one to two periods after it was last set.
+#[derive(Clone, Copy, Debug)]
+struct RecentBits {
+    /// Start of the current period.
+    since: Instant,
+    /// Bits that were set in the current period.
+    current: u8,
+    /// Bits that were set in the previous period.
+    previous: u8,
+}
+
+impl RecentBits {
+    const fn new(now: Instant) -> Self {
+        Self {
+            since: now,
+            current: 0,
+            previous: 0,
+        }
+    }
+
+    /// Sets `bits` at `now`. Returns true if any of them was not yet set in the current period.
+    fn set(&mut self, bits: u8, now: Instant, period: Duration) -> bool {
+        self.expire(now, period);
+        let new = bits & !self.current;
+        self.current |= new;
+        new != 0
+    }
+
+    const fn clear(&mut self, bits: u8) {
+        self.current &= !bits;
+        self.previous &= !bits;
+    }
+
+    fn get(mut self, now: Instant, period: Duration) -> u8 {
+        self.expire(now, period);
+        self.current | self.previous
+    }
+
+    fn expire(&mut self, now: Instant, period: Duration) {
+        let span = now.since(self.since);
+        if span >= period {
+            let is_old = span >= period.times(2);
+            self.previous = if is_old { 0 } else { self.current };
+            (self.current, self.since) = (0, now);
+        }
+    }
+}
+
 /// Set of recently received nodes on one side of the relay.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hearing {
-    since: Instant,
-    now: u8,
-    before: u8,
+pub(super) struct Hearing(RecentBits);
+
+impl Hearing {
+    pub(super) const fn new(now: Instant) -> Self {
+        Self(RecentBits::new(now))
+    }
+
+    pub(super) fn add(&mut self, distance: u16, now: Instant, settings: &Settings) {
+        self.0.set(mask(distance), now, settings.probe_after);
+    }
+
+    /// Returns a bit mask of the recently received nodes; bit 0 is the nearest node. A node stays in the mask for one
+    /// to two times `probe_after` after its last frame.
+    pub(super) fn recent(self, now: Instant, settings: &Settings) -> u8 {
+        self.0.get(now, settings.probe_after)
+    }
 }
 
 /// Nodes on one side of the relay that recently used a wrong mission or a wrong key.
@@ -52,43 +112,32 @@ pub(super) struct Hearing {
 /// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with a wrong key; the nearest node is first.
 /// A bit remains set for one to two minutes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Refusals {
-    since: Instant,
-    now: u8,
-    before: u8,
-}
+pub(super) struct Refusals(RecentBits);
 
 impl Refusals {
-    pub(super) const NONE: Self = Self {
-        since: Instant::ZERO,
-        now: 0,
-        before: 0,
-    };
+    pub(super) const NONE: Self = Self(RecentBits::new(Instant::ZERO));
 
     /// Records a message with a different mission than this relay's from the node `distance` relays away. Returns true
     /// at most once a minute for each node.
     pub(super) fn add_mission(&mut self, distance: u16, now: Instant) -> bool {
-        self.add(mask(distance), now)
+        self.0.set(mask(distance), now, MINUTE)
     }
 
     /// Records a handshake with a wrong key from the node `distance` relays away.
     pub(super) fn add_key(&mut self, distance: u16, now: Instant) {
-        self.add(mask(distance) << CANDIDATES, now);
+        self.0.set(mask(distance) << CANDIDATES, now, MINUTE);
     }
 
     /// Records that the node `distance` relays away uses this relay's key.
     pub(super) fn remove_key(&mut self, distance: u16) {
-        let kept = !(mask(distance) << CANDIDATES);
-        self.now &= kept;
-        self.before &= kept;
+        self.0.clear(mask(distance) << CANDIDATES);
     }
 
     /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
     ///
     /// Nodes `end` or more relays away are left out.
-    pub(super) fn nearest(mut self, now: Instant, end: u16) -> [u16; 2] {
-        self.age(now);
-        let nodes = self.now | self.before;
+    pub(super) fn nearest(self, now: Instant, end: u16) -> [u16; 2] {
+        let nodes = self.0.get(now, MINUTE);
         [nodes & 0x0F, nodes >> CANDIDATES].map(|nodes| {
             #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
             let distance = nodes.trailing_zeros() as u16 + 1;
@@ -99,22 +148,6 @@ impl Refusals {
             }
         })
     }
-
-    fn add(&mut self, nodes: u8, now: Instant) -> bool {
-        self.age(now);
-        let new = nodes & !self.now;
-        self.now |= new;
-        new != 0
-    }
-
-    fn age(&mut self, now: Instant) {
-        let span = now.since(self.since);
-        if span >= MINUTE {
-            let is_old = span >= MINUTE.times(2);
-            self.before = if is_old { 0 } else { self.now };
-            (self.now, self.since) = (0, now);
-        }
-    }
 }
 
 /// Returns the bit of the node `distance` relays away in a bit mask. The result is 0 for a node that is not one of the
@@ -124,40 +157,6 @@ pub(crate) const fn mask(distance: u16) -> u8 {
         1 << (distance - 1)
     } else {
         0
-    }
-}
-
-impl Hearing {
-    pub(super) const fn new(now: Instant) -> Self {
-        Self {
-            since: now,
-            now: 0,
-            before: 0,
-        }
-    }
-
-    pub(super) fn add(&mut self, distance: u16, now: Instant, settings: &Settings) {
-        self.age(now, settings);
-        self.now |= mask(distance);
-    }
-
-    /// Returns a bit mask of the recently received nodes; bit 0 is the nearest node. A node stays in the mask for one
-    /// to two times `probe_after` after its last frame.
-    pub(super) fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
-        self.age(now, settings);
-        self.now | self.before
-    }
-
-    /// Forgets nodes that have not been received for two periods of `probe_after`.
-    fn age(&mut self, now: Instant, settings: &Settings) {
-        let span = now.since(self.since);
-        if span < settings.probe_after {
-            return;
-        }
-        let old = span >= settings.probe_after.times(2);
-        self.before = if old { 0 } else { self.now };
-        self.now = 0;
-        self.since = now;
     }
 }
 

@@ -22,6 +22,7 @@
 //! silence of a neighbour in the same view therefore counts from the end of this relay's own computation.
 
 use crate::node::context::longest_lease;
+use crate::serial_number::next_nonzero;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
@@ -202,10 +203,7 @@ impl Liveness {
 
     /// Records a heartbeat request that is sent at `now`, and returns its number.
     pub(crate) const fn next_request(&mut self, now: Instant) -> u16 {
-        self.request_number = match self.request_number.wrapping_add(1) {
-            0 => 1,
-            number => number,
-        };
+        self.request_number = next_nonzero(self.request_number);
         let [first, second, third, _] = self.request_times;
         self.request_times = [now, first, second, third];
         self.unanswered = self.unanswered.saturating_add(1);

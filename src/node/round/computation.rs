@@ -81,7 +81,7 @@ pub(crate) struct Computation {
     /// Altitudes and powers of the relays of this view, as collected along the chain.
     pub(super) seats: Seats,
     /// Position computed for this relay by the joint method; `None` before the computation.
-    pub(super) chosen: Option<JointPlace>,
+    pub(super) joint_place: Option<JointPlace>,
     /// Lateral offset and altitude that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
     /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. In Algorithm 2 (relays move
@@ -118,7 +118,7 @@ impl Computation {
             began: false,
             profile,
             seats: Seats::UNKNOWN,
-            chosen: None,
+            joint_place: None,
             cross_section: profile.on_line().cross_section,
             after: None,
             agreed_place: None,
@@ -139,7 +139,7 @@ impl Computation {
 
     pub(crate) fn load(&mut self, profile: Profile) {
         self.profile = profile;
-        self.chosen = None;
+        self.joint_place = None;
         self.seats = Seats::UNKNOWN;
         self.sensing.load();
         if self.agreed_place.is_none() {
@@ -157,7 +157,7 @@ impl Computation {
     pub(crate) fn restart(&mut self) {
         self.task.clear();
         // After a new joint solution the leader starts again from the first targets.
-        self.chosen = None;
+        self.joint_place = None;
         self.state.plan();
     }
 
@@ -173,7 +173,7 @@ impl Computation {
         // The slots belong to the mission and the hops of the previous view.
         self.set_slot_shares(None);
         self.after = None;
-        self.chosen = None;
+        self.joint_place = None;
         self.seats = Seats::UNKNOWN;
         self.sensing.renew();
         self.state.renew(leads);
@@ -339,7 +339,7 @@ impl Computation {
     /// offset and altitude are those of the joint method; otherwise they are those configured.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
-        match self.chosen {
+        match self.joint_place {
             Some(JointPlace { cross_section, .. }) if chosen => Station {
                 cross_section,
                 ..given

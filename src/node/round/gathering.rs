@@ -35,7 +35,7 @@ impl Computation {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
         leads
-            && context.joins()
+            && context.solves_jointly()
             && match self.seats.known {
                 None => told || self.has_own_profile(context),
                 Some(known) => known < context.mission().relays(),
@@ -93,7 +93,7 @@ impl Computation {
             seats,
         });
         self.state.wait();
-        if context.is_last() {
+        if context.is_last_of_view() {
             return self.conclude_gathering(context);
         }
         Action::Forward
@@ -122,7 +122,7 @@ impl Computation {
         if self.seats.adopt(roster, context.mission().relays()) {
             // The chain has to be solved again with the complete profiles.
             self.task.clear();
-            self.chosen = None;
+            self.joint_place = None;
         }
         if context.index() == context.mission().leader() {
             return Action::Work;
@@ -135,7 +135,7 @@ impl Computation {
     /// missing.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());
-        context.joins() && self.chosen.is_none() && !partial
+        context.solves_jointly() && self.joint_place.is_none() && !partial
     }
 
     /// Continues the joint solution (positions of all relays) until the leader's next message arrives.
@@ -148,7 +148,7 @@ impl Computation {
     }
 
     pub(super) fn link<'a>(&self, context: &Context<'a>, chosen: bool) -> Link<'a> {
-        let there = self.chosen.filter(|_| chosen);
+        let there = self.joint_place.filter(|_| chosen);
         let fitted = self.fitted.first().filter(|_| there.is_some());
         let fixed_m = fitted.and_then(|fitted| fitted.solved);
         Link {
@@ -199,7 +199,7 @@ impl Computation {
             // The solver used the common profile if this relay's own profile has not been collected yet.
             let cross_section = self.seat(context).room.nearest(solved);
             let fitted = fitted.map(|(at, shares)| (at.x_m, shares));
-            self.chosen = Some(JointPlace {
+            self.joint_place = Some(JointPlace {
                 cross_section,
                 end_m,
                 plain,
@@ -222,7 +222,7 @@ impl Computation {
 
     fn choose_configured(&mut self, context: &Context<'_>) {
         self.set_fitted(None);
-        self.chosen = Some(JointPlace {
+        self.joint_place = Some(JointPlace {
             cross_section: self
                 .seat(context)
                 .room
@@ -235,7 +235,7 @@ impl Computation {
     /// Starts the leader's search for the highest target SIR after the joint solution. The relays use the lateral
     /// offsets and altitudes of this solution. The first targets are near `target` (linear) if `target` is above 0 and
     /// `Settings::predict` is true. Otherwise they are those of a search without a prediction.
-    pub(super) fn search_chosen(
+    pub(super) fn search_joint_place(
         &mut self,
         context: &Context<'_>,
         target: f32,

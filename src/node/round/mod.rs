@@ -303,8 +303,10 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true until this relay has taken part in a pass along the chain or in a view.
-    pub(crate) fn is_fresh(&self) -> bool {
+    /// Returns true if this relay has taken part in no pass along the chain, and in no view, since its start.
+    ///
+    /// Its phase is then `Idle`. Always false at the leader of the mission, which starts in the phase `Planning`.
+    pub(crate) fn is_idle(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }
 
@@ -373,7 +375,7 @@ impl Computation {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {
                 PassKind::Sweep(sweep_pass) if !sweep_pass.is_done() => {
-                    let unknown = ALTITUDE && sweep_pass.chosen && self.chosen.is_none();
+                    let unknown = ALTITUDE && sweep_pass.chosen && self.joint_place.is_none();
                     if unknown && self.solve(context).is_none() {
                         return Action::Work;
                     }
@@ -401,7 +403,7 @@ impl Computation {
         }
         if self.is_solving(context) {
             if let Some(target) = self.solve(context) {
-                self.search_chosen(context, target)?;
+                self.search_joint_place(context, target)?;
                 return Ok(true);
             }
             return Ok(false);
@@ -472,7 +474,7 @@ impl Computation {
         match &self.task {
             LeaderTask::Searching { search, given, .. } => {
                 let ladder = *search.ladder();
-                let chosen = context.joins() && self.chosen.is_some() && !given;
+                let chosen = context.solves_jointly() && self.joint_place.is_some() && !given;
                 self.begin();
                 self.sweep_on(context, ladder, chosen, None, &origins(mission))
             }

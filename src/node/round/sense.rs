@@ -46,7 +46,7 @@ impl Computation {
     /// estimate, the leader starts no other pass (message along the chain).
     pub(super) fn must_distribute(&self, context: &Context<'_>) -> bool {
         Self::is_sensing_enabled(context)
-            && context.leads()
+            && context.leads_view()
             && self
                 .sensing
                 .sensor()
@@ -57,7 +57,7 @@ impl Computation {
     /// on positions, or have found no feasible target.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
-        Self::is_sensing_enabled(context) && context.leads() && settled
+        Self::is_sensing_enabled(context) && context.leads_view() && settled
     }
 
     /// Starts the timer of the next collection of measurements, if this relay may start one.
@@ -116,7 +116,7 @@ impl Computation {
             // The estimate differs from the previous one, so the positions will change.
             sensor.estimate = hearing.estimate;
             self.task.clear();
-            self.chosen = None;
+            self.joint_place = None;
         }
         let mission = context.mission();
         // A node that is excluded twice in a row stays excluded.
@@ -136,7 +136,7 @@ impl Computation {
         let from = hearing.sums;
         let mut hearing = hearing;
         hearing.sums.merge(&own);
-        if context.is_last() {
+        if context.is_last_of_view() {
             hearing.receiver = sensor.level(&sensor.receiver, context.now);
         }
         self.pass = PassKind::Sense(Sense {
@@ -146,7 +146,7 @@ impl Computation {
             holds,
         });
         self.state.wait();
-        if context.is_last() {
+        if context.is_last_of_view() {
             if let PassKind::Sense(sense) = &mut self.pass {
                 sense.hearing.sums = Sums::NONE;
             }
@@ -182,7 +182,7 @@ impl Computation {
         } else {
             self.state.answer();
         }
-        if !context.leads() {
+        if !context.leads_view() {
             return Action::Answer { agreed: false };
         }
         if holds && self.continue_trial(context, &hearing) {
@@ -263,7 +263,7 @@ impl Computation {
             _ => 1,
         };
         self.task.clear();
-        self.chosen = None;
+        self.joint_place = None;
         true
     }
 

@@ -69,7 +69,7 @@ impl Computation {
     /// Continues this relay's computation for several target SIRs by one step.
     pub(super) fn continue_sweep(&mut self, context: &Context<'_>) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
-        if ALTITUDE && is_chosen && self.chosen.is_none() {
+        if ALTITUDE && is_chosen && self.joint_place.is_none() {
             // The relay first needs its joint solution.
             return Action::Work;
         }
@@ -80,7 +80,7 @@ impl Computation {
         if !sweep_pass.advance(link) {
             return Action::Work;
         }
-        if context.is_last() {
+        if context.is_last_of_view() {
             self.conclude_sweep(context)
         } else {
             Action::Forward

@@ -57,7 +57,7 @@ impl Line {
             now: self.now,
             member,
             latest: member.active,
-            end: member.index == RELAYS,
+            is_last_reachable: member.index == RELAYS,
             other_leases: OtherLeases {
                 lease_left: Duration::from_micros(0),
                 view: ViewId::LOADED,

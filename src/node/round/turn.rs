@@ -55,7 +55,7 @@ impl Computation {
         let mut searching = false;
         if let Some(at) = self.agreed_place
             && let Some(interferer) = context.mission().interferer()
-            && (context.is_last() || self.after.is_some())
+            && (context.is_last_of_view() || self.after.is_some())
         {
             let band = context.band(at.altitude_m);
             let hops = Hops::new(
@@ -93,7 +93,7 @@ impl Computation {
     }
 
     pub(super) fn forward_turn(&mut self, context: &Context<'_>) -> Action {
-        if !context.is_last() {
+        if !context.is_last_of_view() {
             return Action::Forward;
         }
         self.conclude_turn(context, f32::MAX)

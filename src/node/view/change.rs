@@ -247,7 +247,7 @@ impl ViewChange {
             usable_in: 0,
         });
         self.circulation.start(context.now);
-        let effects = if context.end {
+        let effects = if context.is_last_reachable {
             self.decide(context)
         } else {
             Effects::NONE
@@ -351,8 +351,8 @@ impl ViewChange {
         proposed.reached = reached;
         proposed.accepted = accepted;
         proposed.usable_in = usable_in;
-        let leads = proposed.rank == 1;
-        if leads && accepted.is_some() {
+        let is_own = proposed.rank == 1;
+        if is_own && accepted.is_some() {
             // All other members have already accepted the view.
             self.electorate.commit();
         }
@@ -360,7 +360,7 @@ impl ViewChange {
         let path = context.path(proposed.rank.saturating_sub(1));
         self.circulation.complete(context.now, path);
         self.request.stop();
-        if leads && accepted.is_none() {
+        if is_own && accepted.is_none() {
             // From this decision relays have learned of a newer view, so they can vote on the next proposal.
             if has_newer_base {
                 self.request.request_now(context.now);
@@ -441,31 +441,31 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Handles the timers of retransmissions and view requests. `leads` is true if this relay has no neighbour toward
-    /// the leader. `fresh` is true if this relay has not taken part in any agreement or view since its start.
+    /// Handles the timers of retransmissions and view requests. `is_first` is true if this relay has no neighbour
+    /// toward the leader. `fresh` is true if this relay has not taken part in any agreement or view since its start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
-        leads: bool,
+        is_first: bool,
         fresh: bool,
     ) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
         let effects = if self.request.is_due(context.now) {
-            self.request_again(context, leads, fresh)
+            self.request_again(context, is_first, fresh)
         } else {
             Effects::NONE
         };
         Effects { resent, ..effects }
     }
 
-    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads.
-    fn request_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
+    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay has none.
+    fn request_again(&mut self, context: &Context<'_>, is_first: bool, fresh: bool) -> Effects {
         let settings = &context.member.settings;
         if !self.request.poll_due(context.now, fresh, settings) {
             return Effects::NONE;
         }
-        if !leads {
+        if !is_first {
             return Effects::of(LayerEvent::RequestView);
         }
         let under_way = self.outstanding().is_some_and(|proposed| {
@@ -478,7 +478,7 @@ impl ViewChange {
         };
         // Each proposal uses up a view number, so none is made without a chance of success.
         let Member { node, all, .. } = *context.member;
-        let is_alone = self.refused && context.end && context.settings().quorum;
+        let is_alone = self.refused && context.is_last_reachable && context.settings().quorum;
         if is_alone
             && self
                 .electorate

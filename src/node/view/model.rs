@@ -424,7 +424,7 @@ impl Check {
             now: Instant::ZERO,
             member,
             latest: member.active,
-            end: chain.after(at).is_none(),
+            is_last_reachable: chain.after(at).is_none(),
             other_leases: OtherLeases::NONE,
         }
     }

@@ -117,7 +117,7 @@ pub(super) fn context(member: &Member, latest: MissionId, end: bool, now: Instan
         now,
         member,
         latest,
-        end,
+        is_last_reachable: end,
         other_leases: OtherLeases::NONE,
     }
 }
