@@ -303,7 +303,7 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true if this relay has taken part in no pass along the chain, and in no view, since its start.
+    /// Returns true if this relay has taken part in no pass and in no view since its start.
     ///
     /// Its phase is then `Idle`. Always false at the leader of the mission, which starts in the phase `Planning`.
     pub(crate) fn is_idle(&self) -> bool {
