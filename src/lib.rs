@@ -87,6 +87,7 @@ mod root;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod root;
+mod sample;
 pub mod sensing;
 pub mod serial;
 mod serial_number;
@@ -137,13 +138,13 @@ pub use mission::{Band, Interference, Interferer, Mission, MissionConfig, Profil
 #[cfg(feature = "departures")]
 pub use node::departure::Departure;
 pub use node::round::state::Phase;
-pub use node::sample::Sample;
 pub use node::view::record::{RecordError, ViewRecord};
 pub use optimiser::joint::fitted::SlotShares;
 pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
 pub use place::{Placement, WithoutQuorum};
 pub use relay::{Port, Relay, Transmit};
+pub use sample::Sample;
 pub use sensing::Listen;
 pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring};
 #[cfg(feature = "internals")]

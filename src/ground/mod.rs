@@ -11,7 +11,6 @@
 
 use crate::features::TELEMETRY;
 use crate::mission::Mission;
-use crate::node::neighbour::hearing::CANDIDATES;
 use crate::sensing::sums::is_level;
 use crate::serial_number::next_nonzero;
 use crate::settings::Wiring;
@@ -19,7 +18,6 @@ use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant, MonotonicClock};
 use crate::view::ViewId;
-use crate::wire::STATION_REACH;
 use crate::wire::auth::Auth;
 use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
@@ -28,6 +26,7 @@ use crate::wire::frame::{FrameBuf, MAX_FRAME};
 use crate::wire::message::{Detail, Entry, Hello, Message, Reports};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
+use crate::wire::{CANDIDATES, STATION_REACH};
 
 /// Time from a relay's last frame until a different node with the same number is accepted. Relays use
 /// `Settings::dead_after` instead.

@@ -17,13 +17,13 @@
 //! | `dispatch` | [`Node`], which owns the layers, and is a relay as its facade sees it; `incoming` is a good start |
 //! | `duplicate` | detection of another node with the same number, and the choice of the one that becomes passive |
 //! | `steering` | setpoint on the way to the agreed position |
-//! | `reports` | states of the relays, on their way to a ground station that watches; without the feature `telemetry` the file `handing_on.rs`, which only hands them on |
+//! | `reports` | states of the relays, on their way to a ground station that watches; without the feature `telemetry` the file `forwarding.rs`, which only forwards them |
 //!
 //! | below the layers | content |
 //! | --- | --- |
 //! | `context` | state that every layer receives, the effects of a layer, and durations that several layers share |
 //! | `circulation` | message along the chain and the reply with its result: stages, duplicates, retransmission, late numbers |
-//! | [`sample`] | measurements of a relay |
+//! | [`measurement`] | measurements of a relay |
 //!
 //! A received message only sets flags, and a pending message is built from the state when it is polled. So there are no queues,
 //! and duplicates are harmless.
@@ -33,12 +33,12 @@ pub(crate) mod context;
 mod dispatch;
 pub(crate) mod duplicate;
 mod lease;
+pub(crate) mod measurement;
 pub(crate) mod mission_update;
 pub(crate) mod neighbour;
-#[cfg_attr(not(feature = "telemetry"), path = "handing_on.rs")]
+#[cfg_attr(not(feature = "telemetry"), path = "forwarding.rs")]
 pub(crate) mod reports;
 pub(crate) mod round;
-pub(crate) mod sample;
 mod steering;
 pub(crate) mod view;
 

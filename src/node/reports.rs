@@ -13,7 +13,7 @@
 //! On a shared channel a station sends its Watches to the eight nearest relays, which report to it. A Watch is also handed on to the relay
 //! four numbers away, repeatedly until that relay reports, unless it sends to the station itself. Every fourth one goes to the neighbour, too. So reports skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. A relay that has sent no frame for 2.5 s is no destination. The time between two reports of a relay is proportional to the first one's
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
-//! `handing_on` takes the place of this file.
+//! `forwarding` takes the place of this file.
 
 use core::num::NonZeroU16;
 

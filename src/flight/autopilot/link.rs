@@ -20,10 +20,10 @@ use crate::flight::mavlink::incoming::{Counters, Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::{FRAME, FrameBytes, Outgoing};
 use crate::geodetic::{Geodetic, Sites};
 use crate::guard::HoldReason;
-use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::relay::Relay;
+use crate::sample::Sample;
 use crate::side::Side;
 use crate::time::{Duration, Instant, MonotonicClock};
 

@@ -10,8 +10,8 @@ use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::{Incoming, Received, noise_w};
 use crate::flight::mavlink::outgoing::SET_MESSAGE_INTERVAL;
 use crate::geodetic::Geodetic;
-use crate::node::sample::Sample;
 use crate::place::Placement;
+use crate::sample::Sample;
 use crate::time::{Duration, Instant};
 
 /// Time without a heartbeat after which the autopilot counts as gone.

@@ -3,7 +3,7 @@
 use super::Node;
 use crate::event::Event;
 use crate::node::mission_update::{Offered, accepts_uploads};
-use crate::node::sample::Sample;
+use crate::sample::Sample;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;

@@ -7,7 +7,7 @@ use super::state::{Action, Phase, RoundState};
 use crate::features::{ADJUST, ALTITUDE, SENSING};
 use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
-use crate::node::sample::{Meter, Sense, Sensing};
+use crate::node::measurement::{Meter, Sense, Sensing};
 use crate::optimiser::PerTarget;
 use crate::optimiser::joint::fitted::SlotShares;
 use crate::optimiser::joint::{MOST_SOLVED, Seat, Solver};

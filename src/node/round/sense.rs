@@ -16,7 +16,7 @@ use super::computation::{Computation, PassKind};
 use super::state::{Action, Phase};
 use crate::features::SENSING;
 use crate::node::context::{Context, PAUSE};
-use crate::node::sample::Sense;
+use crate::node::measurement::Sense;
 use crate::sensing::doubt::{Next, is_absurd, is_deaf, is_off};
 use crate::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread, review};
 use crate::sensing::fit::{Unfit, expected_at};

@@ -11,29 +11,29 @@ use crate::place::Placement;
 /// Message tags: the first byte of a body, which names the kind of message. There are three kinds of sweeps: `SWEEP`,
 /// `MEASURED` with measured interference, and `ASIDE` with a lateral offset.
 pub(super) mod tag {
-    pub(crate) const SWEEP: u8 = 0;
-    pub(crate) const VERDICT: u8 = 1;
-    pub(crate) const BUSY: u8 = 2;
-    pub(crate) const HEARTBEAT: u8 = 3;
-    pub(crate) const MEASURED: u8 = 4;
-    pub(crate) const ASIDE: u8 = 5;
-    pub(crate) const GATHER: u8 = 6;
-    pub(crate) const GATHERED: u8 = 7;
-    pub(crate) const TOKEN: u8 = 8;
-    pub(crate) const MOVED: u8 = 9;
-    pub(crate) const HELLO: u8 = 10;
-    pub(crate) const PROPOSAL: u8 = 11;
-    pub(crate) const DECISION: u8 = 12;
-    pub(crate) const FENCE: u8 = 13;
-    pub(crate) const OFFER: u8 = 14;
-    pub(crate) const PULSE: u8 = 15;
-    pub(crate) const PULSED: u8 = 16;
-    pub(crate) const SENSE: u8 = 17;
-    pub(crate) const SENSED: u8 = 18;
-    pub(crate) const LEVEL: u8 = 19;
-    pub(crate) const CLAIM: u8 = 20;
-    pub(crate) const WATCH: u8 = 21;
-    pub(crate) const REPORT: u8 = 22;
+    pub(crate) const SWEEP: u8 = 0x00;
+    pub(crate) const VERDICT: u8 = 0x01;
+    pub(crate) const BUSY: u8 = 0x02;
+    pub(crate) const HEARTBEAT: u8 = 0x03;
+    pub(crate) const MEASURED: u8 = 0x04;
+    pub(crate) const ASIDE: u8 = 0x05;
+    pub(crate) const GATHER: u8 = 0x06;
+    pub(crate) const GATHERED: u8 = 0x07;
+    pub(crate) const TOKEN: u8 = 0x08;
+    pub(crate) const MOVED: u8 = 0x09;
+    pub(crate) const HELLO: u8 = 0x0A;
+    pub(crate) const PROPOSAL: u8 = 0x0B;
+    pub(crate) const DECISION: u8 = 0x0C;
+    pub(crate) const FENCE: u8 = 0x0D;
+    pub(crate) const OFFER: u8 = 0x0E;
+    pub(crate) const PULSE: u8 = 0x0F;
+    pub(crate) const PULSED: u8 = 0x10;
+    pub(crate) const SENSE: u8 = 0x11;
+    pub(crate) const SENSED: u8 = 0x12;
+    pub(crate) const LEVEL: u8 = 0x13;
+    pub(crate) const CLAIM: u8 = 0x14;
+    pub(crate) const WATCH: u8 = 0x15;
+    pub(crate) const REPORT: u8 = 0x16;
 }
 
 /// 16-bit number in two bytes; postcard would encode a `u16` as a varint.
