@@ -202,23 +202,23 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Records a frame of a second node with this relay's number. Returns true if this relay has a lease now, and had
-    /// one when the first such frame arrived.
-    fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
+    /// Records a frame of a second node with this relay's number. Returns true if this relay may
+    /// defend the number now, and could when the first such frame arrived.
+    fn could_always_defend(&mut self, now: Instant, may_defend: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
-        let held = known.map_or(has_lease, |(_, held)| held);
+        let held = known.map_or(may_defend, |(_, held)| held);
         self.contest = Some((now, held));
-        held && has_lease
+        held && may_defend
     }
 
     /// Handles a frame whose sender has this relay's node number. Returns true if this relay becomes passive.
-    /// `has_lease` is true if this relay has a setpoint and a lease.
+    /// `may_defend` is true if this relay has a setpoint, and a lease or a pending lease.
     pub(crate) fn handle_frame(
         &mut self,
         now: Instant,
         sender: Sender,
-        has_lease: bool,
+        may_defend: bool,
         settings: &Settings,
     ) -> bool {
         match sender {
@@ -231,13 +231,13 @@ impl IndexClaims {
                 let echoes = self.echoed;
                 let echoes = echoes.is_some_and(|at| now.since(at) < settings.probe_after);
                 if settings.auth.is_none() && !echoes {
-                    self.had_position_before(now, has_lease, settings);
+                    self.could_always_defend(now, may_defend, settings);
                     self.defences = self.defences.max(REPEATED_CLAIMS);
                     self.schedule_unprompted(now, settings);
                     self.schedule_claim(now, settings);
                 }
             }
-            Sender::Rival(rival) => return self.compare(now, rival, has_lease, settings),
+            Sender::Rival(rival) => return self.compare(now, rival, may_defend, settings),
         }
         false
     }
@@ -248,10 +248,10 @@ impl IndexClaims {
         &mut self,
         now: Instant,
         rival: Rival,
-        has_lease: bool,
+        may_defend: bool,
         settings: &Settings,
     ) -> bool {
-        let held = self.had_position_before(now, has_lease, settings);
+        let held = self.could_always_defend(now, may_defend, settings);
         if !rival.newer_epoch {
             self.rival = self.rival.max(rival.number);
             self.last_rival = rival.number;
@@ -423,7 +423,7 @@ mod tests {
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
-        for has_lease in [false, true] {
+        for may_defend in [false, true] {
             let mut duplicate = duplicate();
             let own = duplicate.number();
             let before = Claim {
@@ -432,7 +432,7 @@ mod tests {
             };
             let sender = duplicate.rival(before);
             assert!(matches!(sender, Sender::Rival(rival) if !rival.is_current));
-            assert!(!duplicate.handle_frame(at(1), sender, has_lease, &settings));
+            assert!(!duplicate.handle_frame(at(1), sender, may_defend, &settings));
             assert!(duplicate.poll_claim() && !duplicate.is_passive());
             assert_eq!(
                 (duplicate.number(), duplicate.other_number()),
@@ -445,8 +445,8 @@ mod tests {
             };
             let sender = duplicate.rival(answer);
             assert_eq!(
-                duplicate.handle_frame(at(2), sender, has_lease, &settings),
-                !has_lease
+                duplicate.handle_frame(at(2), sender, may_defend, &settings),
+                !may_defend
             );
         }
     }
@@ -463,7 +463,7 @@ mod tests {
             (RAISED | (own - 1), true),
             (RAISED | (own + 1), false),
         ] {
-            for has_lease in [false, true] {
+            for may_defend in [false, true] {
                 for newer_epoch in [false, true] {
                     for passive in [false, true] {
                         let mut duplicate = duplicate();
@@ -474,10 +474,10 @@ mod tests {
                             is_current: true,
                         };
                         let sender = Sender::Rival(rival);
-                        let becomes = duplicate.handle_frame(at(1), sender, has_lease, &settings);
+                        let becomes = duplicate.handle_frame(at(1), sender, may_defend, &settings);
                         let larger = !passive && (newer_epoch || number > own);
-                        let raises = larger && !newer_epoch && has_lease && raised_wins;
-                        assert_eq!(becomes, larger && !raises, "{rival:?} {has_lease}");
+                        let raises = larger && !newer_epoch && may_defend && raised_wins;
+                        assert_eq!(becomes, larger && !raises, "{rival:?} {may_defend}");
                         assert_eq!(duplicate.is_passive(), becomes);
                         let claimed = if raises { own | RAISED } else { own };
                         assert_eq!(duplicate.number(), claimed);

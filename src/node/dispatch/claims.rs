@@ -37,10 +37,10 @@ impl Node {
         // requested.
         let lease = &self.layers.lease;
         let leased = lease.is_pending() || lease.until().is_some_and(|until| until > now);
-        let has_lease = placed && leased;
+        let may_defend_number = placed && leased;
         if self
             .duplicate
-            .handle_frame(now, sender, has_lease, &settings)
+            .handle_frame(now, sender, may_defend_number, &settings)
         {
             self.layers.round.discard_agreed_place();
             if placed {

@@ -15,7 +15,9 @@ use crate::wire::STATION_REACH;
 use crate::wire::message::Message;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`. Returns false if node `from` must not send such a message.
+    /// Handles an intact message from node `from` at `side`. Returns false if it must be counted as misaddressed.
+    ///
+    /// A message is misaddressed if node `from` must not send it to this relay, or while this relay is passive.
     ///
     /// Work: at most the computation of this relay's positions for 16 target SIRs.
     #[inline(never)]
@@ -43,10 +45,10 @@ impl Node {
             self.on_telemetry(now, side, from, message);
             return true;
         }
-        let taken = self.layers.neighbours.at(side).node() == from;
+        let is_neighbour = self.layers.neighbours.at(side).node() == from;
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);
-        neighbour.record_frame(distance, taken, now, &self.member.settings);
+        neighbour.record_frame(distance, is_neighbour, now, &self.member.settings);
         if let Message::Hello(hello) = message {
             if self.is_of_mission(now, side, from, hello.mission) {
                 self.on_hello(now, side, from, *hello);
@@ -58,7 +60,7 @@ impl Node {
             upload,
             offer_number,
         } = message
-            && !taken
+            && !is_neighbour
             && accepts_uploads(&self.member)
         {
             // The sender uses this relay as its neighbour. A hello alone would only trigger the same offer again.
@@ -67,7 +69,7 @@ impl Node {
             }
             return true;
         }
-        if !taken {
+        if !is_neighbour {
             self.schedule_hello(side, from, false);
             return false;
         }
@@ -192,9 +194,7 @@ impl Node {
                 Effects::STALE
             }
             Message::Proposal(_) | Message::Decision(_) => layers.view.handle(&context, message),
-            Message::Busy { number: sweep } if layers.view.on_busy(&context, *sweep) => {
-                Effects::NONE
-            }
+            Message::Busy { number } if layers.view.on_busy(&context, *number) => Effects::NONE,
             // No agreement on positions continues during a view change.
             _ if layers.view.outstanding().is_some() => Effects::STALE,
             _ => {

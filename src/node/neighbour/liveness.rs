@@ -1,23 +1,23 @@
 //! Liveness: detection of a lost neighbour.
 //!
-//! A sign of life is an answer to something that this relay sent: a heartbeat with the number of its question, the
+//! A sign of life is an answer to something that this relay sent: a heartbeat reply with the number of its request, the
 //! reply to a renewal or another message along the chain, or the next such message. It counts from the time at which
 //! this relay sent, so a replayed recording proves nothing.
 //!
 //! This relay waits for a sign of life for `Settings::probe_after`, or for the round trip through the whole chain if
-//! that is longer. Then it sends questions (heartbeat requests) until one is answered. The neighbour is lost once both
+//! that is longer. Then it sends heartbeat requests until one is answered. The neighbour is lost once both
 //! conditions hold:
 //!
 //! | condition | reason |
 //! | --- | --- |
-//! | silence of `Settings::dead_after`, or of the lease's span if that is longer | - |
-//! | sixteen unanswered questions, and three times the longest recent number of unanswered questions before an answer | a run of lost frames is not a lost neighbour |
+//! | silence of `Settings::dead_after`, or of the lease's duration if that is longer | - |
+//! | sixteen unanswered requests, and three times the longest recent run of unanswered requests before a reply | a run of lost frames is not a lost neighbour |
 //!
-//! This longest number is sixteen at first, and each answer lowers it by an eighth. So a neighbour that is silent after
-//! its first frames is lost after 48 questions. After some ten answers it is lost after sixteen, like a neighbour that
+//! This longest run is sixteen at first, and each reply lowers it by an eighth. So a neighbour that is silent after
+//! its first frames is lost after 48 requests. After some ten replies it is lost after sixteen, like a neighbour that
 //! was never received.
 //!
-//! A neighbour is also lost after eight times `dead_after`. From then on, a question is sent every `probe_after`.
+//! A neighbour is also lost after eight times `dead_after`. From then on, a request is sent every `probe_after`.
 //! Relays of one view that choose their positions jointly compute at the same time and send nothing meanwhile. The
 //! silence of a neighbour in the same view therefore counts from the end of this relay's own computation.
 
@@ -40,7 +40,7 @@ const MARGIN: u16 = 3;
 /// It is the round trip through `all` relays, but short enough for sixteen requests between a silence of `probe_after`
 /// and a silence of `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
-    paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
+    request_interval(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
 
 /// Returns the interval between heartbeat requests before the first agreement on positions.
@@ -48,7 +48,7 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
 /// The interval is longer than [`tick`], because many relays then search on one channel. It is short enough for three
 /// requests between a silence of `probe_after` and a silence of `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
-    paced(settings, all, third(waiting(settings)))
+    request_interval(settings, all, third(waiting(settings)))
 }
 
 /// Returns the time from the first heartbeat request to the loss of a silent neighbour, in µs. It is `dead_after` -
@@ -72,8 +72,10 @@ fn third(number: u64) -> u64 {
 }
 
 /// Returns the round trip time through a chain of `all` relays, at most `most_micros` µs.
-#[inline(never)] // called from both
-fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
+///
+/// The result is at least a 64th of [`waiting`], also if `most_micros` is less.
+#[inline(never)] // called from `tick` and `patient_tick`
+fn request_interval(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     let least = waiting(settings) / 64 + 1;
     let round = settings.hop_time.times(2 * u32::from(all));
     let micros = round.as_micros().clamp(least, most_micros.max(least));

@@ -2,7 +2,7 @@
 //!
 //! | state | neighbour lost | hello of the neighbour does not name this relay | hello received from another node that receives this relay | timer |
 //! | --- | --- | --- | --- | --- |
-//! | `Linked` | shared channel: `Searching`; otherwise continue to send questions | `Pairing` | selected instead after `probe_after`, if it is better and its link is not held down | without a quorum for three times `dead_after`, and every four times from then on: `Searching` |
+//! | `Linked` | shared channel: `Searching`; otherwise continue to send heartbeat requests | `Pairing` | selected instead after `probe_after`, if it is better and its link is not held down | without a quorum for three times `dead_after`, and every four times from then on: `Searching` |
 //! | `Pairing` | `Searching` | - | as above | after the wait below: `Searching`; without a quorum as above |
 //! | `Searching` | - | - | selected unless its link is held down; a farther one not before nearer ones could be received; one whose link was dropped without a quorum after `probe_after` | after the wait below: `NoPeer` |
 //! | `NoPeer` | - | - | selected unless its link is held down: at once if it has selected this relay, else after `probe_after` | hello to the four nearest nodes every `dead_after`, every half of `probe_after` once one was received |
@@ -26,7 +26,7 @@
 //! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, including the
 //! selected one. The reason is that up to three relays in a row may be lost at once. A node that is selected after
 //! `probe_after` must be received without a gap for that time. Of several nodes the nearest one counts. Links that were
-//! lost repeatedly are held down (see [`damping`](super::damping)). On wires, only questions are sent to a lost
+//! lost repeatedly are held down (see [`damping`](super::damping)). On wires, only heartbeat requests are sent to a lost
 //! neighbour until it answers.
 //!
 //! A node that returns causes a request for a new view `probe_after` later. The node on its other side may be about to

@@ -125,7 +125,7 @@ impl Computation {
             self.joint_place = None;
         }
         if context.index() == context.mission().leader() {
-            return Action::Work;
+            return Action::ContinueWithoutReply;
         }
         Action::Answer { agreed: false }
     }
@@ -142,7 +142,7 @@ impl Computation {
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
-            return Action::Think;
+            return Action::Continue;
         }
         Action::Nothing
     }

@@ -162,12 +162,12 @@ impl Round {
             Action::Nothing => Effects::NONE,
             Action::Foreign => Effects::FOREIGN,
             Action::Stale => Effects::STALE,
-            Action::Work => {
+            Action::ContinueWithoutReply => {
                 self.circulation.withdraw();
                 self.work_soon(context.now);
                 Effects::NONE
             }
-            Action::Think => {
+            Action::Continue => {
                 self.work_soon(context.now);
                 Effects::NONE
             }
@@ -195,7 +195,7 @@ impl Round {
                     Effects::NONE
                 }
             }
-            Action::Settled => {
+            Action::EndTask => {
                 self.circulation.close();
                 Effects::NONE
             }
@@ -229,7 +229,7 @@ impl Round {
 
     pub(crate) fn restart(&mut self, context: &Context<'_>) -> Effects {
         self.computation.restart();
-        self.proceed(context, Action::Work)
+        self.proceed(context, Action::ContinueWithoutReply)
     }
 
     /// Ends the current pass along the chain without a result, because a new view is proposed.
@@ -378,7 +378,7 @@ impl Computation {
                 PassKind::Sweep(sweep_pass) if !sweep_pass.is_done() => {
                     let unknown = ALTITUDE && sweep_pass.chosen && self.joint_place.is_none();
                     if unknown && self.solve(context).is_none() {
-                        return Action::Work;
+                        return Action::ContinueWithoutReply;
                     }
                     return self.continue_sweep(context);
                 }
@@ -391,7 +391,7 @@ impl Computation {
         }
         match self.plan(context) {
             Ok(true) => self.begin_pass(context),
-            Ok(false) => Action::Work,
+            Ok(false) => Action::ContinueWithoutReply,
             Err(Infeasible) => self.give_up(),
         }
     }
@@ -484,7 +484,7 @@ impl Computation {
                 self.begin();
                 self.take_turn(context, TurnPass::new(turn, sir, None))
             }
-            _ => Action::Work,
+            _ => Action::ContinueWithoutReply,
         }
     }
 }

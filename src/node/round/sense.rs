@@ -186,7 +186,7 @@ impl Computation {
             return Action::Answer { agreed: false };
         }
         if holds && self.continue_trial(context, &hearing) {
-            return Action::Settled;
+            return Action::EndTask;
         }
         if holds && !self.review_estimate(context, &hearing) {
             if let Some(sensor) = self.sensing.sensor_mut() {
@@ -195,10 +195,10 @@ impl Computation {
                     sensor.wait = (2 * sensor.wait).min(RAREST);
                 }
             }
-            return Action::Settled;
+            return Action::EndTask;
         }
         self.state.plan();
-        Action::Work
+        Action::ContinueWithoutReply
     }
 
     /// Continues the leader's search for a faulty sensor with the collected measurements. Returns true if the search

@@ -47,10 +47,10 @@ pub(crate) enum Action {
     Nothing,
     /// Ignore the received message, and count it as outdated.
     Stale,
-    /// Stop awaiting a reply to the last message, and continue the computation after a pause.
-    Work,
-    /// Continue the computation after a pause. If a message awaits a reply, go on waiting.
-    Think,
+    /// Continue the computation after a pause, and no longer await a reply to the last message.
+    ContinueWithoutReply,
+    /// Continue the computation after a pause. A message that awaits a reply still awaits it.
+    Continue,
     /// Forward the message to the next relay, and retransmit it until there is a reply.
     Forward,
     /// Repeat the reply, because the received message is a duplicate.
@@ -61,7 +61,7 @@ pub(crate) enum Action {
         agreed: bool,
     },
     /// End the leader's pass along the chain. The leader has no further pass to start.
-    Settled,
+    EndTask,
     /// Report that no target SIR is feasible.
     Infeasible,
     /// Request a new view, because this relay cannot take part in the leader's present pass.
@@ -72,9 +72,9 @@ pub(crate) enum Action {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     New,
-    Again,
-    Straggler,
-    /// Foreign: the leader has restarted, or this relay has missed earlier passes along the chain.
+    Duplicate,
+    Late,
+    /// The leader has restarted, or this relay has missed earlier passes along the chain.
     Foreign,
 }
 
@@ -83,8 +83,8 @@ impl Arrival {
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
-            Self::Again => Some(Action::Repeat),
-            Self::Straggler => Some(Action::Stale),
+            Self::Duplicate => Some(Action::Repeat),
+            Self::Late => Some(Action::Stale),
             Self::Foreign => Some(Action::Foreign),
         }
     }
@@ -92,7 +92,7 @@ impl Arrival {
 
 /// Maximum difference between the number of the current pass and that of a late message. A larger difference shows that
 /// the leader has restarted.
-const STRAGGLERS: u16 = 32;
+const MAX_LATE: u16 = 32;
 
 /// Common divisor of the numbers of first passes (messages along the chain). A first pass is the leader's first one in
 /// a view or after its start. Only first passes have multiples of 64 as numbers. So a relay can join a first pass
@@ -198,9 +198,9 @@ impl RoundState {
         }
         let ahead = number.wrapping_sub(self.number);
         match (ahead, self.number.wrapping_sub(number)) {
-            (0, _) if same => Arrival::Again,
+            (0, _) if same => Arrival::Duplicate,
             _ if number == self.next() => Arrival::New,
-            (_, 1..=STRAGGLERS) => self.straggler(),
+            (_, 1..=MAX_LATE) => self.straggler(),
             _ => Arrival::Foreign,
         }
     }
@@ -211,7 +211,7 @@ impl RoundState {
         if self.late_messages.count_one() {
             Arrival::Foreign
         } else {
-            Arrival::Straggler
+            Arrival::Late
         }
     }
 
@@ -240,7 +240,7 @@ impl RoundState {
 
 #[cfg(test)]
 mod tests {
-    use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
+    use super::{Arrival, INCARNATION, MAX_LATE, Phase, RoundState};
     use crate::node::circulation::SUSPICIOUS;
 
     /// Returns the state of a relay that has accepted the pass along the chain with the number 200.
@@ -276,8 +276,8 @@ mod tests {
                 let number = last.wrapping_add(off);
                 let expected = if number == next {
                     Arrival::New
-                } else if last.wrapping_sub(number) <= STRAGGLERS {
-                    Arrival::Straggler
+                } else if last.wrapping_sub(number) <= MAX_LATE {
+                    Arrival::Late
                 } else {
                     Arrival::Foreign
                 };
@@ -295,13 +295,13 @@ mod tests {
     #[test]
     fn the_same_again_is_answered_and_the_fourth_straggler_in_a_row_is_none() {
         let mut state = begun();
-        assert_eq!(state.arrival(200, true), Arrival::Again);
+        assert_eq!(state.arrival(200, true), Arrival::Duplicate);
         assert_eq!(state.arrival(200, false), Arrival::Foreign);
         for _ in 1..SUSPICIOUS {
-            assert_eq!(state.arrival(199, false), Arrival::Straggler);
+            assert_eq!(state.arrival(199, false), Arrival::Late);
         }
         assert_eq!(state.arrival(199, false), Arrival::Foreign);
-        assert_eq!(state.arrival(199, false), Arrival::Straggler);
+        assert_eq!(state.arrival(199, false), Arrival::Late);
     }
 
     #[test]

@@ -71,14 +71,14 @@ impl Computation {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         if ALTITUDE && is_chosen && self.joint_place.is_none() {
             // The relay first needs its joint solution.
-            return Action::Work;
+            return Action::ContinueWithoutReply;
         }
         let link = self.link(context, is_chosen);
         let PassKind::Sweep(sweep_pass) = &mut self.pass else {
             return Action::Stale;
         };
         if !sweep_pass.advance(link) {
-            return Action::Work;
+            return Action::ContinueWithoutReply;
         }
         if context.is_last_of_view() {
             self.conclude_sweep(context)
@@ -124,13 +124,13 @@ impl Computation {
                 && !search.accept(target)
             {
                 self.state.answer();
-                return Action::Work;
+                return Action::ContinueWithoutReply;
             }
             return self.agree(context);
         }
         self.state.answer();
         if self.must_gather(context) {
-            return Action::Work;
+            return Action::ContinueWithoutReply;
         }
         let LeaderTask::Searching { search, .. } = &mut self.task else {
             return Action::Answer { agreed: false };
@@ -149,7 +149,7 @@ impl Computation {
                 return self.give_up();
             }
         }
-        Action::Work
+        Action::ContinueWithoutReply
     }
 
     /// Completes the agreement on positions, or starts the next algorithm of the configured method.
@@ -160,11 +160,11 @@ impl Computation {
                 Method::Adjust(adjust) if ADJUST => {
                     self.task.adjust(adjust);
                     self.state.answer();
-                    return Action::Work;
+                    return Action::ContinueWithoutReply;
                 }
                 Method::Joint if self.must_gather(context) => {
                     self.state.answer();
-                    return Action::Work;
+                    return Action::ContinueWithoutReply;
                 }
                 _ => {}
             }

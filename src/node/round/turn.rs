@@ -69,7 +69,7 @@ impl Computation {
         }
         self.pass = PassKind::Turn(turn_pass);
         if searching {
-            Action::Work
+            Action::ContinueWithoutReply
         } else {
             self.forward_turn(context)
         }
@@ -83,7 +83,7 @@ impl Computation {
         let [one_way, both_ways] = PLACES_AT_ONCE;
         let is_one_way = !(context.mission().reverse() > 0.0);
         match turn_pass.step(if is_one_way { one_way } else { both_ways }) {
-            Poll::Pending => Action::Work,
+            Poll::Pending => Action::ContinueWithoutReply,
             Poll::Ready(None) => self.forward_turn(context),
             Poll::Ready(Some(place)) => {
                 self.agree_on(place, place.cross_section());
@@ -144,7 +144,7 @@ impl Computation {
         }
         if let LeaderTask::Adjusting(rounds) = &mut self.task {
             if !rounds.advance(turn_pass.any, turn_pass.worst.min(incoming)) {
-                return Action::Work;
+                return Action::ContinueWithoutReply;
             }
             self.task.clear();
         }
