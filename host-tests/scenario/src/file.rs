@@ -287,11 +287,7 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
             relative_error: raw.relative_error,
         }),
         noise: noise(&raw.noise, &powers),
-        reverse: raw
-            .link
-            .as_ref()
-            .and_then(|link| link.reverse)
-            .unwrap_or(0.0),
+        reverse: reverse(file, raw.link.as_ref().and_then(|link| link.reverse))?,
         link: raw
             .link
             .filter(RawDataLink::has_radio)
@@ -350,6 +346,23 @@ fn noise(raw: &RawNoise, powers: &Powers) -> Noise {
         power_dbm: raw.power_dbm,
         gains_dbi: [powers.uav_gain_dbi, powers.rx_gain_dbi],
     }
+}
+
+/// Smallest `link.reverse` above 0. A smaller value would be 0 in the missions of the relays, which have 32-bit floats.
+const LEAST_REVERSE: f64 = 1e-9;
+
+fn reverse(file: &str, reverse: Option<f64>) -> Result<f64, ScenarioError> {
+    let reverse = reverse.unwrap_or(0.0);
+    if reverse > 0.0 && reverse < LEAST_REVERSE {
+        return Err(mistake(
+            file,
+            "link.reverse",
+            Some(number(reverse)),
+            Problem::OutOfRange,
+            format!("0.0, or {LEAST_REVERSE:e} to 1.0"),
+        ));
+    }
+    Ok(reverse)
 }
 
 fn data_link(file: &str, raw: RawDataLink, noise_hz: Option<f64>) -> Result<Link, ScenarioError> {

@@ -348,10 +348,10 @@ impl Default for Scenario {
 
 impl Scenario {
     /// Returns the bandwidth of the data link, Hz, from the scenario: `[link]`, or else `[noise]`. `None` if neither
-    /// has a bandwidth.
+    /// has a bandwidth of at least 1 Hz.
     pub fn bandwidth_hz(&self) -> Option<f64> {
         let own = self.link.as_ref().and_then(|link| link.bandwidth_hz);
-        own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))
+        own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz >= 1.0))
     }
 
     /// Returns true if the scenario has fitted slots. Relays with the method `joint` then maximise the data rate.

@@ -798,6 +798,22 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
                 .to_owned(),
         );
     }
+    let is_fitted = scenario.has_fitted_slots();
+    if scenario.listen.is_some()
+        && (is_fitted || scenario.reverse > 0.0 && options.altitude == Altitude::Free)
+    {
+        let (what, remedy) = if is_fitted {
+            ("link.access = \"fitted\"", "use another link.access")
+        } else {
+            (
+                "--altitude free with link.reverse above 0",
+                "leave --altitude out",
+            )
+        };
+        return refuse(format!(
+            "{what}: cannot be used with --out and [listen], because the method joint needs a known interferer: {remedy}, or leave [listen] out"
+        ));
+    }
     if options.wanted.target_rate_bps.is_none()
         && let Number::Of(relays) = options.number()
     {

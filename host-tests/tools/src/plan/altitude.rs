@@ -11,7 +11,9 @@ use uav_relay::optimiser::spacing::RequiredPosition;
 use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
+use super::rate::Rate;
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
+use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::{Scenario, mission};
 
 const MOST: usize = Mission::MAX_RELAYS as usize;
@@ -42,6 +44,72 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
         // Relays in flight also keep their own altitudes then.
         None => source::best(scenario, relays, tolerance),
     }
+}
+
+/// Number of bisection steps that find the ratio of SIRs for the largest data rate.
+const RATIO_STEPS: u8 = 8;
+
+/// Returns the plan with free altitudes and the largest data rate over `radio`.
+///
+/// For data in both directions with r below 1, in equal slots or with a frequency for each hop. A rate R to Rx and r R back need the SINRs g(R) and
+/// g(r R). Their ratio is not r, and depends on R. At the largest rate both directions carry what is needed, so the
+/// joint method is repeated with ratios from g(r R) / g(R) to r, by bisection on the logarithm. R is the rate back
+/// at the ratio r, divided by r: a smaller ratio lowers it. The best plan of all steps is returned; at least the plan
+/// for the ratio r.
+///
+/// # Errors
+/// As [`best`].
+pub(super) fn best_for_rate(
+    scenario: &Scenario,
+    relays: u16,
+    tolerance: f64,
+    radio: &Radio,
+) -> Result<Plan, NoPlan> {
+    let reverse = scenario.reverse;
+    let mut best = best(scenario, relays, tolerance)?;
+    // Rates to Rx, and back divided by r, while a hop transmits.
+    let rates = |plan: &Plan| match Rate::of_hop(plan, scenario, radio) {
+        Rate::Both([there_bps, back_bps]) => [there_bps, back_bps / reverse],
+        Rate::There(there_bps) => [there_bps; 2],
+    };
+    let least = |[there_bps, back_bps]: [f64; 2]| there_bps.min(back_bps);
+    let model = &radio.link.model;
+    let ratio = |rate_bps: f64| {
+        let there = model.sinr(rate_bps / radio.bandwidth_hz)?;
+        let back = model.sinr(reverse * rate_bps / radio.bandwidth_hz)?;
+        (there > 0.0 && back > 0.0).then(|| (back / there).min(1.0).ln())
+    };
+    let [there_bps, back_bps] = rates(&best);
+    let bounds = ratio(back_bps).zip(ratio(there_bps));
+    let Some((mut low, mut high)) = bounds.filter(|_| there_bps < back_bps) else {
+        return Ok(best);
+    };
+    for _ in 0..RATIO_STEPS {
+        let middle = f64::midpoint(low, high);
+        let other = Scenario {
+            reverse: middle.exp(),
+            ..scenario.clone()
+        };
+        let Some(places) = joint(&ProfiledMission::new(&other, relays, tolerance)?) else {
+            break;
+        };
+        let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
+        let plan = briefed.plan(
+            &places,
+            "the joint method for the data rates of both directions",
+            false,
+        );
+        let [there_bps, back_bps] = rates(&plan);
+        if there_bps < back_bps {
+            high = middle;
+        } else {
+            low = middle;
+        }
+        if least([there_bps, back_bps]) > least(rates(&best)) {
+            best = plan;
+        }
+    }
+    Ok(best)
 }
 
 /// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.

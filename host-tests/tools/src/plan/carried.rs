@@ -1,9 +1,10 @@
-//! Positions on the line Tx-Rx with the largest data rate.
+//! Positions with the largest data rate: on the line Tx-Rx, or with free altitudes.
 //!
 //! | hops | directions | positions |
 //! | --- | --- | --- |
 //! | equal slots or own channels | one, or both with r = 1 | those of the largest SIR, by Algorithm 1 |
 //! | equal slots or own channels | both, r < 1 | Algorithm 1 with the ratio of SIRs that both rates need, and a shortest path |
+//! | equal slots or own channels, free altitudes | both, r < 1 | the joint method with that ratio (`altitude`) |
 //! | fitted slots | one or both | a shortest path (`path`) |
 //!
 //! A rate R to Rx and r R back need the SINRs g(R) and g(r R). Their ratio is not r, and depends on R. So Algorithm 1
@@ -23,7 +24,7 @@ use crate::fewest;
 
 use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
-use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
+use super::{NoPlan, Plan, PlanRequest, ProfiledMission, altitude, source, steps};
 
 /// Largest relative excess of a chain's time per bit over the smallest time, both on the coarse grid.
 ///
@@ -40,6 +41,8 @@ pub struct Carried<'a> {
     scenario: &'a Scenario,
     radio: &'a Radio,
     tolerance: f64,
+    /// True if the relays may choose their altitudes and lateral offsets.
+    free_altitude: bool,
     /// Largest number of relays for which `table` has positions.
     most: u16,
     table: OnceCell<Option<Table>>,
@@ -49,8 +52,8 @@ impl<'a> Carried<'a> {
     /// Creates the planner for up to `most` relays; `None` if the positions with the best SIR are used.
     ///
     /// They are used if they also maximise the data rate: with equal time slots or a frequency for each hop, for data
-    /// in one direction or at equal rates in both. They are also used for free altitudes, for a requested x, and for
-    /// any interference other than a single interferer.
+    /// in one direction or at equal rates in both. They are also used for fitted slots with free altitudes, for a
+    /// requested x, and for any interference other than a single interferer.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -60,11 +63,15 @@ impl<'a> Carried<'a> {
         let is_alone =
             matches!(&scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_between = scenario.reverse > 0.0 && scenario.reverse < 1.0;
-        let differs = radio.link.access == Access::Fitted || is_between;
-        (is_alone && differs && !ask.free_altitude && ask.x_m.is_none()).then(|| Self {
+        let differs = match radio.link.access {
+            Access::Fitted => !ask.free_altitude,
+            _ => is_between,
+        };
+        (is_alone && differs && ask.x_m.is_none()).then(|| Self {
             scenario,
             radio,
             tolerance: ask.tolerance,
+            free_altitude: ask.free_altitude,
             most,
             table: OnceCell::new(),
         })
@@ -98,6 +105,9 @@ impl<'a> Carried<'a> {
     /// # Errors
     /// [`NoPlan`] if the scenario is not a valid mission, or if no positions give every hop an SIR above 0.
     pub fn plan(&self, relays: u16) -> Result<Plan, NoPlan> {
+        if self.free_altitude {
+            return altitude::best_for_rate(self.scenario, relays, self.tolerance, self.radio);
+        }
         let by_sir = source::best(self.scenario, relays, self.tolerance)?;
         let briefed = ProfiledMission::new(self.scenario, relays, self.tolerance)?;
         let Some(scene) = Scene::new(self.scenario, relays) else {
@@ -147,9 +157,12 @@ impl<'a> Carried<'a> {
 
     /// Returns `plan`, with `proven` set if it is proven that no positions have a larger data rate.
     ///
-    /// There is no proof for fitted time slots (as long as each hop needs).
+    /// There is no proof for fitted time slots (as long as each hop needs), and none for free altitudes.
     #[must_use]
     pub fn proven(&self, plan: Plan) -> Plan {
+        if self.free_altitude {
+            return plan;
+        }
         let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
         let Some(scene) = Scene::new(self.scenario, relays) else {
             return plan;

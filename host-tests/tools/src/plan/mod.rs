@@ -67,7 +67,11 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
 /// Returns the plan of `ask` for a scenario with one interferer.
 fn with_one_interferer(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     match ask.number {
-        Number::Of(1) if ask.free_altitude && ask.x_m.is_none() && scenario.has_fitted_slots() => {
+        Number::Of(1)
+            if ask.free_altitude
+                && ask.x_m.is_none()
+                && (scenario.has_fitted_slots() || scenario.reverse > 0.0) =>
+        {
             altitude::best(scenario, 1, ask.tolerance)
         }
         Number::Of(1) if scenario.reverse > 0.0 => source::alone_both_ways(scenario, ask.tolerance),

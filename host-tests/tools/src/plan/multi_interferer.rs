@@ -2,7 +2,7 @@
 //!
 //! A hypothetical interferer replaces them, so that relays can find their positions by themselves. If these positions
 //! lose more than 1 % against the true sum of the interferers, the best positions for that sum are used. For both
-//! directions these are found by a shortest path. For relays with free altitudes and fitted time slots, the data rate
+//! directions these are found by a shortest path, with free altitudes also by local search. For relays with free altitudes and fitted time slots, the data rate
 //! decides instead of the SIR.
 
 use uav_relay::Placement;
@@ -133,10 +133,20 @@ impl Planner<'_> {
             return at(scene, x_m);
         }
         if let Some(radio) = &self.radio {
-            return self.by_rate(radio, scene, start);
+            return self.by_moves(Some(radio), scene, start);
         }
         if scene.reverse > 0.0 {
-            return both_ways(scene, start, self.ask.tolerance);
+            let at_own = both_ways(scene, start, self.ask.tolerance);
+            if !self.ask.free_altitude {
+                return at_own;
+            }
+            let unproven = at_own.map(|best| Best {
+                proven: false,
+                ..best
+            });
+            let free = self.by_moves(None, scene, start);
+            let all = unproven.into_iter().chain(free);
+            return all.max_by(|a, b| a.value.total_cmp(&b.value));
         }
         if !self.ask.free_altitude
             && let Some(chain) = optimum(scene)
@@ -181,17 +191,17 @@ impl Planner<'_> {
         self.variants().iter().filter_map(best).collect()
     }
 
-    /// Returns the chain with the largest data rate found from several start chains.
-    fn by_rate(&self, radio: &Radio, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
+    /// Returns the chain with the largest value ([`merit`]) found by moves from several start chains.
+    fn by_moves(&self, radio: Option<&Radio>, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
         let mut starts = self.of_variants(scene);
         starts.extend(start.map(places));
         starts.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|start| merit(Some(radio), scene, start));
+            let [a, b] = [a, b].map(|start| merit(radio, scene, start));
             b.total_cmp(&a)
         });
         starts.truncate(POLISHED);
-        let improved = starts.into_iter().map(|start| faster(radio, scene, start));
-        let best = improved.map(|places| Best::new(Some(radio), scene, &places, false));
+        let improved = starts.into_iter().map(|start| moved(radio, scene, start));
+        let best = improved.map(|places| Best::new(radio, scene, &places, false));
         best.max_by(|a, b| a.value.total_cmp(&b.value))
     }
 
@@ -371,17 +381,17 @@ fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best
 
 /// First and last length of the trial moves of relays in a search, as fractions of the distance Tx-Rx.
 const MOVES: [f64; 2] = [1.0 / 16.0, 1e-5];
-/// Relative increase of the data rate in a round of moves, below which the moves are halved.
+/// Relative increase of the value in a round of moves, below which the moves are halved.
 const GAIN: f64 = 1e-4;
 /// Rounding error allowed in the distance of two relays, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 2e-7;
 
-/// Returns the chain `start` after moves that raise its data rate.
+/// Returns the chain `start` after moves that raise its value ([`merit`]).
 ///
 /// A move shifts relay k, or relays 1 to k, or relays k to N, along one coordinate.
-fn faster(radio: &Radio, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
+fn moved(radio: Option<&Radio>, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
     let (d, band) = (scene.distance_m, scene.band);
-    let moved = |at: Place, holds: bool, axis: usize, by: f64| match axis {
+    let shifted = |at: Place, holds: bool, axis: usize, by: f64| match axis {
         0 => Place {
             x: (at.x + by).clamp(0.0, d),
             ..at
@@ -406,7 +416,7 @@ fn faster(radio: &Radio, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
         })
     };
     let count = start.len();
-    let mut best = (merit(Some(radio), scene, &start), start);
+    let mut best = (merit(radio, scene, &start), start);
     let [mut width, last] = MOVES.map(|width| width * d);
     while width > last {
         let before = best.0;
@@ -415,9 +425,9 @@ fn faster(radio: &Radio, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
                 let mut places = best.1.clone();
                 let own = places.iter_mut().zip(&scene.relays);
                 for (place, relay) in own.take(group.end).skip(group.start) {
-                    *place = moved(*place, relay.holds, axis, by);
+                    *place = shifted(*place, relay.holds, axis, by);
                 }
-                let value = merit(Some(radio), scene, &places);
+                let value = merit(radio, scene, &places);
                 if value > best.0 && is_apart(&places) {
                     best = (value, places);
                 }

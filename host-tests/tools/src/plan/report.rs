@@ -496,7 +496,8 @@ impl PlanReport {
         let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
         let sirs = plan.sirs_back(scenario);
         for (relay, sir) in self.relays.iter_mut().zip(&sirs) {
-            relay.sir_back = Some(*sir);
+            // Relays at the same position have an infinite SIR, which JSON cannot express.
+            relay.sir_back = Some(sir.min(f64::from(f32::MAX)));
         }
         let worst = sirs
             .iter()

@@ -354,6 +354,56 @@ fn wrong_requests_for_fitted_slots_and_free_altitudes_are_named() {
     }
 }
 
+/// Checks that `--out` refuses the joint method with `[listen]`, both ways or with fitted slots.
+///
+/// `cargo provision` refuses it, too.
+#[test]
+fn the_joint_method_with_listening_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.toml");
+    for (link, parts) in [
+        ("reverse = 0.5", ["--altitude free", "link.reverse"]),
+        (
+            "access = \"fitted\"\nbandwidth_hz = 1e6",
+            ["link.access", "fitted"],
+        ),
+    ] {
+        let file = scenario(5.0, &format!("{link}\n[listen]"));
+        let options = format!("--uavs 2 --altitude free --out {}", out.display());
+        let output = plan(&file, &options);
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        assert!(
+            parts.iter().all(|part| line.contains(part)) && line.contains("[listen]"),
+            "{line}"
+        );
+        assert!(!out.exists());
+    }
+}
+
+/// Checks that a `reverse` and a noise bandwidth near 0 are refused, with key, value and range.
+#[test]
+fn a_reverse_and_a_noise_bandwidth_near_zero_are_refused() {
+    for (link, options, parts) in [
+        (
+            "reverse = 1e-10",
+            "--uavs 2",
+            ["link.reverse", "1e-10", "1e-9 to 1.0"],
+        ),
+        (
+            "reverse = 0.5",
+            "--uavs 2 --rates",
+            ["--rates", "bandwidth", "1 to 1e12 Hz"],
+        ),
+    ] {
+        let file = scenario(5.0, &format!("{link}\n[noise]\nbandwidth_hz = 0.5"));
+        let output = plan(&file, options);
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        assert!(parts.iter().all(|part| line.contains(part)), "{line}");
+    }
+}
+
 /// Checks that fitted slots with free altitudes are planned by the joint method, as on board.
 ///
 /// No number of relays is proven to be the best one.

@@ -5,6 +5,7 @@
 #![allow(clippy::float_cmp)]
 
 mod command;
+mod free;
 mod judge;
 mod one;
 

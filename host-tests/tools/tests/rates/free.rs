@@ -1,0 +1,183 @@
+//! Plans with free altitudes, for data in both directions.
+
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use uav_relay_scenario::link::{Access, Link, Radio, RateModel};
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Interference, Scenario, Source};
+use uav_relay_tools::plan::rate::Rates;
+use uav_relay_tools::plan::{Number, PlanRequest, plan};
+
+use super::{BANDWIDTH_HZ, TOLERANCE, number};
+
+/// Draws a scenario with a range of altitudes and of lateral offsets.
+fn drawn(rng: &mut ChaCha8Rng) -> Scenario {
+    let aside_m = rng.random_range(20.0..400.0);
+    let mut log = |low: f64, high: f64| rng.random_range(low.ln()..high.ln()).exp();
+    Scenario {
+        tx_w: log(0.1, 100.0),
+        rx_w: log(0.1, 100.0),
+        reverse: log(0.02, 1.0),
+        min_separation_m: 0.0,
+        altitude_min_m: 20.0,
+        altitude_m: 20.0,
+        altitude_max_m: log(30.0, 200.0),
+        lateral_min_m: -aside_m,
+        lateral_max_m: aside_m,
+        interference: Interference::Sources(vec![Source {
+            power_w: log(0.3, 100.0),
+            x_m: log(1.0, 1000.0),
+            y_m: log(50.0, 500.0),
+        }]),
+        ..Scenario::default()
+    }
+}
+
+fn request(relays: u16, free_altitude: bool) -> PlanRequest {
+    PlanRequest {
+        number: Number::Of(relays),
+        free_altitude,
+        x_m: None,
+        tolerance: TOLERANCE,
+    }
+}
+
+/// Returns the largest worst SIR of one relay on a grid of x, y and altitude, refined three times.
+fn scanned(scenario: &Scenario) -> f64 {
+    let scene = Scene::new(scenario, 1).unwrap();
+    let bounds = [
+        (0.0, scenario.distance_m),
+        (scenario.lateral_min_m, scenario.lateral_max_m),
+        (scenario.altitude_min_m, scenario.altitude_max_m),
+    ];
+    let (mut best, mut middle) = (0.0_f64, [0.0; 3]);
+    for round in 0..4 {
+        let spans = bounds.map(|(low, high)| (high - low) * 0.1_f64.powi(round));
+        let centre = middle;
+        let at = |axis: usize, step: i32| {
+            let (low, high) = bounds[axis];
+            let from = if round == 0 {
+                f64::midpoint(low, high)
+            } else {
+                centre[axis]
+            };
+            (from + spans[axis] * (f64::from(step) / 40.0 - 0.5)).clamp(low, high)
+        };
+        for (i, j, k) in
+            (0..=40).flat_map(|i| (0..=40).flat_map(move |j| (0..=40).map(move |k| (i, j, k))))
+        {
+            let place = [at(0, i), at(1, j), at(2, k)];
+            let worst = worst_at(&scene, scenario.reverse, place);
+            if worst > best {
+                (best, middle) = (worst, place);
+            }
+        }
+    }
+    best
+}
+
+fn worst_at(scene: &Scene, reverse: f64, [x, y, altitude]: [f64; 3]) -> f64 {
+    let source = &scene.sources[0];
+    let relay = &scene.relays[0];
+    let squared = |dx: f64, dy: f64| dx * dx + dy * dy + altitude * altitude;
+    let l1 = squared(x, y);
+    let l2 = squared(scene.distance_m - x, y);
+    let noise_w = scene.noise_w;
+    let heard_w = source.power_w / (scene.eta * squared(x - source.x_m, y - source.y_m)) + noise_w;
+    let there = (scene.tx_w / (scene.eta * l1) / heard_w)
+        .min(relay.power_w / (scene.eta * l2) / (scene.interference_rx_w() + noise_w));
+    let back = (scene.rx_w / (scene.eta * l2) / heard_w)
+        .min(relay.power_w / (scene.eta * l1) / (scene.interference_on_ground_w(0.0) + noise_w));
+    there.min(back / reverse)
+}
+
+/// Checks that a plan of one relay for both directions uses its lateral range and altitudes.
+#[test]
+fn one_relay_with_free_altitude_both_ways() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3361);
+    let mut worst = f64::INFINITY;
+    for round in 0..number("COUNT", 8) {
+        let scenario = drawn(&mut rng);
+        let found = plan(&scenario, &request(1, true)).unwrap().sir();
+        let share = found / scanned(&scenario);
+        worst = worst.min(share);
+        assert!(share > 0.999, "round {round}: {share} in {scenario:?}");
+    }
+    println!("one relay, free altitude: worst {worst:.6}");
+}
+
+/// Checks that free altitudes reach the SIR of each common altitude, against two interferers.
+///
+/// No plan claims a proof.
+#[test]
+fn free_altitudes_against_several_interferers_both_ways() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3363);
+    let mut worst = f64::INFINITY;
+    for round in 0..number("COUNT", 4) {
+        let mut scenario = drawn(&mut rng);
+        let second = Source {
+            power_w: rng.random_range(0.5..50.0),
+            x_m: rng.random_range(0.0..1000.0),
+            y_m: -rng.random_range(50.0..500.0),
+        };
+        if let Interference::Sources(sources) = &mut scenario.interference {
+            sources.push(second);
+        }
+        let relays = rng.random_range(1..=6);
+        let free = plan(&scenario, &request(relays, true)).unwrap();
+        assert!(!free.proven, "round {round}: {scenario:?}");
+        for step in 0..=4 {
+            let span = scenario.altitude_max_m - scenario.altitude_min_m;
+            let altitude_m = scenario.altitude_min_m + span * f64::from(step) / 4.0;
+            let level = Scenario {
+                altitude_m,
+                ..scenario.clone()
+            };
+            let kept = plan(&level, &request(relays, false)).unwrap();
+            let share = free.sir() / kept.sir();
+            worst = worst.min(share);
+            // Relays keep positions for a hypothetical interferer that lose up to 1 %.
+            assert!(
+                share > 0.99,
+                "round {round}, {relays} relays, {altitude_m} m: {share} in {scenario:?}"
+            );
+        }
+    }
+    println!("several interferers, free altitudes divided by common ones: worst {worst:.6}");
+}
+
+/// Checks that free altitudes carry at least as much as the configured altitude.
+///
+/// With equal slots and with channels.
+#[test]
+fn free_altitudes_carry_no_less() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3362);
+    let mut worst = f64::INFINITY;
+    for round in 0..number("COUNT", 8) {
+        let scenario = drawn(&mut rng);
+        let access = [Access::Slots, Access::Channels][usize::from(round % 2 == 1)];
+        let radio = Radio {
+            link: Link {
+                access,
+                bandwidth_hz: None,
+                model: RateModel::Shannon { gap_db: 0.0 },
+            },
+            bandwidth_hz: BANDWIDTH_HZ,
+        };
+        let [kept, free] = [false, true].map(|is_free| {
+            let rates = Rates::new(&scenario, &request(1, is_free), &radio, None).unwrap();
+            rates.all
+        });
+        for (kept, free) in kept.iter().zip(&free).take(8) {
+            let [kept_bps, free_bps] = [kept, free].map(|of| of.rate_bps.worse(scenario.reverse));
+            let share = free_bps / kept_bps;
+            worst = worst.min(share);
+            assert!(
+                share > 0.999,
+                "round {round}, {} relays, {access:?}: {free_bps} {kept_bps} in {scenario:?}",
+                kept.uavs
+            );
+        }
+    }
+    println!("free altitudes divided by the configured one: worst {worst:.6}");
+}
