@@ -1,5 +1,7 @@
 //! Check before flight of a whole chain, `--check`: a table of the relays' reports.
 
+use std::collections::BTreeMap;
+
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Duration, Ground, Instant, Phase, Report};
 use uav_relay_linux::check::{End, colour, verdict};
@@ -20,6 +22,8 @@ const GREEN_FOR: Duration = Duration::from_millis(2_000);
 #[derive(Debug)]
 pub(crate) struct Check {
     end: End,
+    /// Newest report of each relay. The key is the relay's number.
+    reports: BTreeMap<u16, Report>,
 }
 
 impl Check {
@@ -32,24 +36,30 @@ impl Check {
                 green_for: GREEN_FOR,
                 green_since: None,
             },
+            reports: BTreeMap::new(),
         }
     }
 
     /// Logs the table of the relays, and returns the result at the end of the check; `None` before the end.
     ///
-    /// The check ends when all relays have stayed green (without a fault), or when its time is over.
+    /// `arrived` are the reports received since the last call. The check ends when all relays have stayed green (without
+    /// a fault), or when its time is over.
     pub(crate) fn turn(
         &mut self,
         now: Instant,
         plan: &Plan,
-        ground: &Ground,
+        arrived: &[Report],
         log: &Log,
     ) -> Outcome {
-        let reports: Vec<Report> = ground.reports().collect();
-        let version = reports.iter().map(|it| it.version).max().unwrap_or(0);
+        for report in arrived {
+            let newest = self.reports.entry(report.relay).or_insert(*report);
+            newest.update(*report);
+        }
+        let reports = &self.reports;
+        let version = reports.values().map(|it| it.version).max().unwrap_or(0);
         let relays = plan.loaded.mission.relays();
         let rows = (1..=relays).map(|index| {
-            let report = reports.iter().find(|it| it.relay == index);
+            let report = reports.get(&index);
             let faults = report.map_or(vec!["no report"], |it| faults(now, it, relays, version));
             (index, report, faults)
         });
@@ -126,6 +136,10 @@ fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'sta
         (
             report.other_mission.is_some(),
             "a relay near it has another mission",
+        ),
+        (
+            report.old_epoch.is_some(),
+            "a relay near it has started with an old epoch",
         ),
         (
             report.refuses_setpoint,

@@ -39,6 +39,8 @@ fn healthy(relay: u16, relays: u16) -> Report {
         refuses_setpoint: false,
         other_mission: None,
         other_key: None,
+        old_epoch: None,
+        has_details: true,
         interference_w: None,
         version: 0,
     }
@@ -131,7 +133,7 @@ impl Watched {
             "restarted" => (report.agreed, report.setpoint) = (None, None),
             "brief" => {
                 (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
-                report.version = 0;
+                (report.has_details, report.version) = (false, 0);
             }
             "version2" => report.version = 2,
             "nonext" => report.neighbours[1] = None,
@@ -142,6 +144,7 @@ impl Watched {
             "duplicated" => report.is_duplicated = true,
             "refuses" => report.refuses_setpoint = true,
             "key2" => report.other_key = Some(2),
+            "epoch2" => report.old_epoch = Some(2),
             "mission2" => report.other_mission = Some(2),
             "mission4" => report.other_mission = Some(4),
             "deafback" => report.silent[0] = true,
@@ -303,7 +306,7 @@ fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
     watched.second();
     let clear = |watched: &mut Watched, relay| {
         let now = Instant::from_millis(1_000 * watched.second);
-        watched.view.clear(now, relay, [])
+        watched.view.clear(now, relay, &[])
     };
     for relay in [0, 3, 9] {
         assert!(clear(&mut watched, relay).is_err(), "{relay} is not lost");
@@ -323,7 +326,7 @@ fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
             at,
             ..healthy(relay, RELAYS)
         };
-        let reply = watched.view.clear(now, 3, [report]);
+        let reply = watched.view.clear(now, 3, &[report]);
         assert_eq!(reply.is_err(), is_refused);
     }
     let late = watched.relays.get(&3).copied().unwrap();

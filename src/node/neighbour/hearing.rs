@@ -1,5 +1,6 @@
 //! Nodes on one side of a relay: recently received nodes, consecutive events, and pending hellos.
 
+use crate::event::NodeEvent;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
@@ -47,15 +48,15 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Nodes on one side of the relay that recently used a wrong mission or a wrong key.
+/// Nodes on one side of the relay that recently used a wrong mission, an old epoch or a wrong key.
 ///
-/// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with a wrong key; the nearest node is first.
-/// A bit remains set for one to two minutes.
+/// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with an old epoch, bits 8 to 11 for nodes
+/// with a wrong key; the nearest node is first. A bit remains set for one to two minutes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Refusals {
+pub(crate) struct Refusals {
     since: Instant,
-    now: u8,
-    before: u8,
+    now: u16,
+    before: u16,
 }
 
 impl Refusals {
@@ -65,32 +66,37 @@ impl Refusals {
         before: 0,
     };
 
-    /// Records a message with a different mission than this relay's from the node `distance` relays away. Returns true
-    /// at most once a minute for each node.
-    pub(super) fn add_mission(&mut self, distance: u16, now: Instant) -> bool {
-        self.add(mask(distance), now)
+    /// Records a wrong mission, an old epoch or a wrong key of the node `distance` relays away. Returns true at most once
+    /// a minute for each node and reason.
+    pub(crate) fn add(&mut self, reason: NodeEvent, distance: u16, now: Instant) -> bool {
+        self.age(now);
+        let first = match reason {
+            NodeEvent::Mission => 0,
+            NodeEvent::Epoch => CANDIDATES,
+            _ => 2 * CANDIDATES,
+        };
+        let nodes = u16::from(mask(distance)) << first;
+        let new = nodes & !self.now;
+        self.now |= new;
+        new != 0
     }
 
-    /// Records a handshake with a wrong key from the node `distance` relays away.
-    pub(super) fn add_key(&mut self, distance: u16, now: Instant) {
-        self.add(mask(distance) << CANDIDATES, now);
-    }
-
-    /// Records that the node `distance` relays away uses this relay's key.
-    pub(super) fn remove_key(&mut self, distance: u16) {
-        let kept = !(mask(distance) << CANDIDATES);
+    /// Records that the node `distance` relays away uses this relay's key and a new epoch.
+    pub(super) fn remove_signer(&mut self, distance: u16) {
+        let kept = !(u16::from(mask(distance)) * 0x110);
         self.now &= kept;
         self.before &= kept;
     }
 
-    /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
+    /// Returns the distances of the nearest nodes with a wrong mission, an old epoch, and a wrong key; 0 for none.
     ///
     /// Nodes `end` or more relays away are left out.
-    pub(super) fn nearest(mut self, now: Instant, end: u16) -> [u16; 2] {
+    pub(crate) fn nearest(mut self, now: Instant, end: u16) -> [u16; 3] {
         self.age(now);
         let nodes = self.now | self.before;
-        [nodes & 0x0F, nodes >> CANDIDATES].map(|nodes| {
-            #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+        [0, CANDIDATES, 2 * CANDIDATES].map(|first| {
+            let nodes = nodes >> first & 0x0F;
+            #[expect(clippy::cast_possible_truncation, reason = "at most 16")]
             let distance = nodes.trailing_zeros() as u16 + 1;
             if nodes == 0 || distance >= end {
                 0
@@ -98,13 +104,6 @@ impl Refusals {
                 distance
             }
         })
-    }
-
-    fn add(&mut self, nodes: u8, now: Instant) -> bool {
-        self.age(now);
-        let new = nodes & !self.now;
-        self.now |= new;
-        new != 0
     }
 
     fn age(&mut self, now: Instant) {

@@ -93,6 +93,8 @@ impl Chain {
                 refuses_setpoint: false,
                 other_mission: None,
                 other_key: None,
+                old_epoch: None,
+                has_details: true,
                 interference_w: None,
                 version: relay.version(),
             };
