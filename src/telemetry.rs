@@ -49,13 +49,13 @@ pub struct Report {
     /// Number of the nearest node that has started with an epoch (start counter) not above its last one. The relay
     /// rejects its frames. `None` for none.
     pub old_epoch: Option<u16>,
-    /// True if the report has values of the relay's *details*: `setpoint`, `agreed`, `neighbours`, `interference_w` and
-    /// `version`. A relay sends them only with every eighth report; see [`Report::update`].
-    pub has_details: bool,
     /// Interference power last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
-    /// Version of the mission that the relay flies.
-    pub version: u16,
+    /// Version of the mission that the relay flies; `None` in a report without *details*.
+    ///
+    /// Details are the version, `setpoint`, `agreed`, `neighbours` and `interference_w`. A relay sends them only with every
+    /// eighth report; see [`Report::update`].
+    pub version: Option<u16>,
 }
 
 /// Phases in the order of their numbers in a report.
@@ -122,11 +122,10 @@ impl Report {
             return false;
         }
         let before = core::mem::replace(self, newer);
-        if !self.has_details {
+        if self.version.is_none() {
             self.setpoint = before.setpoint;
             self.agreed = before.agreed;
             self.neighbours = before.neighbours;
-            self.has_details = before.has_details;
             self.interference_w = before.interference_w;
             self.version = before.version;
         }
@@ -159,9 +158,8 @@ impl Report {
             other_mission: refused(entry, 1),
             other_key: refused(entry, 1 + 2 * CANDIDATES),
             old_epoch: refused(entry, 1 + 4 * CANDIDATES),
-            has_details: detail.is_some(),
             interference_w: None,
-            version: 0,
+            version: None,
         };
         if let Some(detail) = detail {
             let [before, after] = detail.neighbours.map(u16::from);
@@ -173,7 +171,7 @@ impl Report {
             report.neighbours =
                 [before, after].map(|node| Some(node).filter(|node| *node != report.relay));
             report.interference_w = Some(detail.power_w()).filter(|power_w| *power_w > 0.0);
-            report.version = detail.version();
+            report.version = Some(detail.version());
         }
         report
     }
@@ -216,7 +214,7 @@ mod tests {
             Report::of(&entry, detail, Instant::from_millis(millis))
         };
         let mut known = report(100, None);
-        assert!(!known.has_details);
+        assert_eq!(known.version, None);
         for (millis, version, expected) in [
             (100, Some(7), report(100, None)),
             (101, Some(7), report(101, Some(7))),

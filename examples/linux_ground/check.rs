@@ -56,7 +56,7 @@ impl Check {
             newest.update(*report);
         }
         let reports = &self.reports;
-        let version = reports.values().map(|it| it.version).max().unwrap_or(0);
+        let version = reports.values().filter_map(|it| it.version).max();
         let relays = plan.loaded.mission.relays();
         let rows = (1..=relays).map(|index| {
             let report = reports.get(&index);
@@ -82,17 +82,16 @@ impl Check {
                 let position = it.position.map_or_else(String::new, |at| {
                     format!("{:.0}, {:.0}, {:.0} m", at.x_m, at.y_m, at.altitude_m)
                 });
-                let node = |node: Option<u16>| {
-                    node.map_or_else(|| "-".to_owned(), |node| node.to_string())
-                };
-                let [before, after] = it.neighbours.map(node);
+                let number =
+                    |it: Option<u16>| it.map_or_else(|| "-".to_owned(), |it| it.to_string());
+                let [before, after] = it.neighbours.map(number);
                 let control = it
                     .control
                     .map_or_else(|| "-".to_owned(), |state| format!("{state:?}"));
                 format!(
                     "{control:<9} {position:<20} {:<11} {:<8}",
                     format!("{before}, {after}"),
-                    it.version
+                    number(it.version)
                 )
             });
             let faults = faults.join(", ");
@@ -115,7 +114,7 @@ impl Check {
 }
 
 /// Returns the faults of a relay before flight. An empty list means that the relay is green.
-fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'static str> {
+fn faults(now: Instant, report: &Report, relays: u16, version: Option<u16>) -> Vec<&'static str> {
     let Report {
         relay,
         control,

@@ -334,7 +334,7 @@ pub(crate) fn state(
     let is_adopted = uploading.is_adopted();
     let flying = reports
         .iter()
-        .filter(|it| is_adopted && Some(it.version) == version);
+        .filter(|it| is_adopted && version.is_some() && it.version == version);
     let arrived = flying
         .clone()
         .filter(|it| has_arrived(it))

@@ -35,7 +35,9 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 /// Time after which a hello (status request) to the polled relay is repeated if there was no answer.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Maximum number of received reports that wait for [`Ground::poll_report`]; 1 without the feature `telemetry`.
+/// Maximum number of received reports that wait for [`Ground::poll_report`].
+///
+/// Without the feature `telemetry` it is 1, and no report is received.
 const REPORTED: usize = if TELEMETRY { 64 } else { 1 };
 
 /// Interval in which every relay in radio reach is sent one request for the reports of all relays.

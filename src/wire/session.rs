@@ -179,7 +179,7 @@ pub(crate) enum Checked {
     /// Frame with a valid tag that was received before. Also a frame with a counter too old for the check of
     /// duplicates.
     Replayed,
-    /// Fifth or later outdated handshake in a row, which proves that the node's epoch went back or was used twice.
+    /// Fifth or later outdated handshake in a row. It proves that the node's epoch went back or was used twice.
     WentBack,
 }
 

@@ -329,8 +329,8 @@ impl StationView {
     /// Updates the newest version of the mission according to the relays' recent reports.
     fn follow_version(&mut self, now: Instant) {
         let reports = self.known.values().map(|it| it.report);
-        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER && it.has_details);
-        if let Some(newest) = fresh.map(|it| it.version).max()
+        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER);
+        if let Some(newest) = fresh.filter_map(|it| it.version).max()
             && self.version() != Some(newest)
         {
             self.version = Some((newest, now));
@@ -500,10 +500,8 @@ impl StationView {
             for (reason, _) in own.into_iter().filter(|(_, is)| *is) {
                 add(reason, number, vec![number], String::new());
             }
-            let version = known.report.version;
-            if let Some((newest, since)) = self.version
+            if let (Some((newest, since)), Some(version)) = (self.version, known.report.version)
                 && version != newest
-                && known.report.has_details
                 && known.report.at.since(since) >= SILENT_AFTER
             {
                 let note = format!(": version {version}, other relays version {newest}");
@@ -611,8 +609,10 @@ fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
             all => format!("neighbours: {}", named(all)),
         });
     }
-    if old.version != new.version {
-        lines.push(format!("flies version {} of the mission", new.version));
+    if let Some(version) = new.version
+        && version != old.version.unwrap_or(0)
+    {
+        lines.push(format!("flies version {version} of the mission"));
     }
     lines
 }

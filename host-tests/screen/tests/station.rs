@@ -40,9 +40,8 @@ fn healthy(relay: u16, relays: u16) -> Report {
         other_mission: None,
         other_key: None,
         old_epoch: None,
-        has_details: true,
         interference_w: None,
-        version: 0,
+        version: Some(0),
     }
 }
 
@@ -133,9 +132,9 @@ impl Watched {
             "restarted" => (report.agreed, report.setpoint) = (None, None),
             "brief" => {
                 (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
-                (report.has_details, report.version) = (false, 0);
+                report.version = None;
             }
-            "version2" => report.version = 2,
+            "version2" => report.version = Some(2),
             "nonext" => report.neighbours[1] = None,
             "noback" => report.neighbours[0] = None,
             "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),

@@ -143,9 +143,9 @@ impl Node {
         self.refuse(now, side, from, NodeEvent::Mission);
     }
 
-    /// Records that this relay refuses node `from` at `side`, and reports the node to the firmware at most once a minute.
+    /// Records that this relay refuses node `from` at `side`.
     ///
-    /// `reason` is [`NodeEvent::Mission`], [`NodeEvent::Epoch`] or [`NodeEvent::Key`]. If this relay refused no node
+    /// The node is reported to the firmware at most once a minute. `reason` is [`NodeEvent::Mission`], [`NodeEvent::Epoch`] or [`NodeEvent::Key`]. If this relay refused no node
     /// before, its next report to a ground station is early.
     pub(crate) fn refuse(&mut self, now: Instant, side: Side, from: u16, reason: NodeEvent) {
         let distance = from.abs_diff(self.member.node);

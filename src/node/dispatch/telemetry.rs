@@ -456,7 +456,7 @@ mod tests {
         assert_eq!(node.refusals(NOW + ms(250_000)), [0, 5]);
     }
 
-    /// Checks that an old epoch is reported ahead of the turn, while its node goes on sending and up to two minutes longer.
+    /// Checks that an old epoch is reported ahead of the turn, until a new epoch is received.
     #[test]
     fn an_old_epoch_is_reported_at_once_until_a_new_one() {
         let mut node = watched(3, Wiring::Shared);

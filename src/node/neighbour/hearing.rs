@@ -88,9 +88,9 @@ impl Refusals {
         self.before &= kept;
     }
 
-    /// Returns the distances of the nearest nodes with a wrong mission, an old epoch, and a wrong key; 0 for none.
+    /// Returns the distances of the nearest nodes that are refused; 0 for none.
     ///
-    /// Nodes `end` or more relays away are left out.
+    /// The values are for a wrong mission, an old epoch, and a wrong key, in this order. Nodes `end` or more relays away are left out.
     pub(crate) fn nearest(mut self, now: Instant, end: u16) -> [u16; 3] {
         self.age(now);
         let nodes = self.now | self.before;

@@ -734,7 +734,7 @@ impl Neighbour {
         self.forged.has(distance, FORGED)
     }
 
-    /// Resets the refusals of the node `distance` relays away, which has used this relay's key and a new epoch.
+    /// Resets the refusals for key and epoch of the node `distance` relays away: both are right now.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
         self.refusals.remove_signer(distance);

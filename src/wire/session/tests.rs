@@ -298,8 +298,8 @@ fn after_the_last_nonce_no_new_node_is_accepted() {
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
 
-/// Checks that a node whose epoch is older than before, or reused, is reported from its fifth handshake on. Replays of
-/// its frames are not reported.
+/// Checks that a node with an old or reused epoch is reported from its fifth handshake on. Replays of its frames are not
+/// reported.
 #[test]
 fn an_epoch_that_went_back_is_reported_a_replay_never() {
     for epoch in [1, 7] {

@@ -94,9 +94,8 @@ impl Chain {
                 other_mission: None,
                 other_key: None,
                 old_epoch: None,
-                has_details: true,
                 interference_w: None,
-                version: relay.version(),
+                version: Some(relay.version()),
             };
             LiveRelay {
                 report,
