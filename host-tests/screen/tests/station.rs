@@ -116,7 +116,8 @@ impl Watched {
             "off" => _ = self.off.insert(relay),
             "ok" => {
                 let Report { version, at, .. } = *report;
-                (*report, report.version, report.at) = (healthy(relay, self.of), version, at);
+                (*report, report.version, report.at) =
+                    (healthy(relay, self.of), version.or(Some(0)), at);
             }
             "noquorum" => report.phase = Phase::NoQuorum,
             "infeasible" => report.phase = Phase::Infeasible,
