@@ -60,7 +60,8 @@ pub enum Event {
     },
     /// A node signs its handshakes with a key that is not this relay's key.
     ///
-    /// Raised after three such handshakes in a row; a handshake with the right key starts the count again. An operator
+    /// Raised after three such handshakes in a row, then once a minute while they go on; a handshake with the right key
+    /// starts the count again. An operator
     /// should give both nodes the same key. An attacker without the key can raise this event with three forged
     /// handshakes in a row, but not with one forged frame. If messages of the node are received at the same time, this
     /// is an attack, and the node has the right key.
@@ -72,7 +73,8 @@ pub enum Event {
     ///
     /// The key is right, but the node did not increase its epoch at its last start. The epoch is smaller than the last
     /// known one, or equal with the same seed. A handshake with a newer epoch starts the count again. An operator
-    /// increases the node's epoch and restarts it, or restarts this relay and its other neighbours. A replay of one
+    /// increases the node's epoch and restarts it, or restarts this relay and its other neighbours. Raised once a minute
+    /// while the handshakes go on. A replay of one
     /// recorded frame does not raise the event, but a replay in order of five handshakes of one start does. If `node`
     /// is this relay, its neighbours know a newer epoch, and this relay becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
@@ -193,8 +195,8 @@ pub(crate) enum NodeEvent {
     Back,
     NotHeard,
     Mission,
-    Key,
     Epoch,
+    Key,
     /// Two nodes use the same index. If it is this relay's own index, the event is stored for the upstream side.
     Index,
     /// The measurements of the node do not fit those of all other nodes.
@@ -209,8 +211,8 @@ impl NodeEvent {
         Self::Back,
         Self::NotHeard,
         Self::Mission,
-        Self::Key,
         Self::Epoch,
+        Self::Key,
         Self::Index,
         Self::Sensor,
         #[cfg(feature = "departures")]

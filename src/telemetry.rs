@@ -46,10 +46,16 @@ pub struct Report {
     pub other_mission: Option<u16>,
     /// Number of the nearest node whose last handshakes were not made with the relay's key. `None` for none.
     pub other_key: Option<u16>,
+    /// Number of the nearest node that has started with an epoch (start counter) not above its last one. The relay
+    /// rejects its frames. `None` for none.
+    pub old_epoch: Option<u16>,
     /// Interference power last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
-    /// Version of the mission that the relay flies.
-    pub version: u16,
+    /// Version of the mission that the relay flies; `None` in a report without *details*.
+    ///
+    /// Details are the version, `setpoint`, `agreed`, `neighbours` and `interference_w`. A relay sends them only with every
+    /// eighth report; see [`Report::update`].
+    pub version: Option<u16>,
 }
 
 /// Phases in the order of their numbers in a report.
@@ -91,8 +97,8 @@ const HOLDS: [HoldReason; 7] = [
 
 /// Returns the number of the node that the relay in `entry` ignores; `None` for none.
 ///
-/// Only one reason is considered: a different mission if `first` is 1, a different key if `first` is 9. `first` is the
-/// lowest code of this reason in the entry.
+/// Only one reason is considered: a different mission if `first` is 1, a different key if `first` is 9, an old epoch if
+/// `first` is 17. `first` is the lowest code of this reason in the entry.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),
@@ -107,8 +113,27 @@ fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
 }
 
 impl Report {
+    /// Replaces this report by `newer`, another report of the same relay. If `newer` has no details, those of this report
+    /// are kept.
+    ///
+    /// Returns false, and changes nothing, if `newer` is not newer: copies of a report arrive by several ways.
+    pub fn update(&mut self, newer: Self) -> bool {
+        if newer.at <= self.at {
+            return false;
+        }
+        let before = core::mem::replace(self, newer);
+        if self.version.is_none() {
+            self.setpoint = before.setpoint;
+            self.agreed = before.agreed;
+            self.neighbours = before.neighbours;
+            self.interference_w = before.interference_w;
+            self.version = before.version;
+        }
+        true
+    }
+
     /// Creates the report of one relay from `entry`, its state at the time `at`. `detail` has further values of the
-    /// relay, as last received; `None` without such values.
+    /// relay; `None` without such values.
     ///
     /// Not part of the public interface: tests and tools of this workspace decode captures with it.
     #[doc(hidden)]
@@ -132,8 +157,9 @@ impl Report {
             refuses_setpoint: control % 7 == REFUSED,
             other_mission: refused(entry, 1),
             other_key: refused(entry, 1 + 2 * CANDIDATES),
+            old_epoch: refused(entry, 1 + 4 * CANDIDATES),
             interference_w: None,
-            version: 0,
+            version: None,
         };
         if let Some(detail) = detail {
             let [before, after] = detail.neighbours.map(u16::from);
@@ -145,7 +171,7 @@ impl Report {
             report.neighbours =
                 [before, after].map(|node| Some(node).filter(|node| *node != report.relay));
             report.interference_w = Some(detail.power_w()).filter(|power_w| *power_w > 0.0);
-            report.version = detail.version();
+            report.version = Some(detail.version());
         }
         report
     }
@@ -160,20 +186,47 @@ mod tests {
         let refused = |refusal: u16, relay: u16| {
             let entry = Entry::new(relay + 1_000 * refusal, 0, 0, Coarse::of(None));
             let report = Report::of(&entry, None, Instant::ZERO);
-            (report.relay, report.other_mission, report.other_key)
+            let named = [report.other_mission, report.other_key, report.old_epoch];
+            (report.relay, named)
         };
         for relay in [5, 1_000] {
-            assert_eq!(refused(0, relay), (relay, None, None));
+            assert_eq!(refused(0, relay), (relay, [None; 3]));
             for distance in 1..=4 {
                 let [before, after] = [relay - distance, relay + distance].map(Some);
-                assert_eq!(refused(distance, relay), (relay, before, None));
-                assert_eq!(refused(distance + 4, relay), (relay, after, None));
-                assert_eq!(refused(distance + 8, relay), (relay, None, before));
-                assert_eq!(refused(distance + 12, relay), (relay, None, after));
+                assert_eq!(refused(distance, relay), (relay, [before, None, None]));
+                assert_eq!(refused(distance + 4, relay), (relay, [after, None, None]));
+                assert_eq!(refused(distance + 8, relay), (relay, [None, before, None]));
+                assert_eq!(refused(distance + 12, relay), (relay, [None, after, None]));
+                assert_eq!(refused(distance + 16, relay), (relay, [None, None, before]));
+                assert_eq!(refused(distance + 20, relay), (relay, [None, None, after]));
             }
         }
         // Decoded reports may name nodes before Tx.
-        assert_eq!(refused(4, 3), (3, None, None));
+        assert_eq!(refused(4, 3), (3, [None; 3]));
+    }
+
+    #[test]
+    fn details_stay_until_a_newer_report_has_others() {
+        let report = |millis, version: Option<u16>| {
+            let places = [1.0, 2.0].map(|x_m| Coarse::of(Some(Placement::on_line(x_m, 20.0))));
+            let detail = version.map(|version| Detail::new(places, [1, 2], 0.5, version));
+            let entry = Entry::new(2, 0, 0, Coarse::of(None));
+            Report::of(&entry, detail, Instant::from_millis(millis))
+        };
+        let mut known = report(100, None);
+        assert_eq!(known.version, None);
+        for (millis, version, expected) in [
+            (100, Some(7), report(100, None)),
+            (101, Some(7), report(101, Some(7))),
+            (102, None, report(102, Some(7))),
+            (101, Some(8), report(102, Some(7))),
+            (103, Some(0), report(103, Some(0))),
+        ] {
+            let is_newer = known.at < Instant::from_millis(millis);
+            assert_eq!(known.update(report(millis, version)), is_newer);
+            assert_eq!(known, expected);
+        }
+        assert_eq!(known.neighbours, [Some(1), Some(4)]);
     }
 
     #[test]

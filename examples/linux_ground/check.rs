@@ -1,5 +1,7 @@
 //! Check before flight of a whole chain, `--check`: a table of the relays' reports.
 
+use std::collections::BTreeMap;
+
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Duration, Ground, Instant, Phase, Report};
 use uav_relay_linux::check::{End, colour, verdict};
@@ -20,6 +22,8 @@ const GREEN_FOR: Duration = Duration::from_millis(2_000);
 #[derive(Debug)]
 pub(crate) struct Check {
     end: End,
+    /// Newest report of each relay. The key is the relay's number.
+    reports: BTreeMap<u16, Report>,
 }
 
 impl Check {
@@ -32,24 +36,30 @@ impl Check {
                 green_for: GREEN_FOR,
                 green_since: None,
             },
+            reports: BTreeMap::new(),
         }
     }
 
     /// Logs the table of the relays, and returns the result at the end of the check; `None` before the end.
     ///
-    /// The check ends when all relays have stayed green (without a fault), or when its time is over.
+    /// `arrived` are the reports received since the last call. The check ends when all relays have stayed green (without
+    /// a fault), or when its time is over.
     pub(crate) fn turn(
         &mut self,
         now: Instant,
         plan: &Plan,
-        ground: &Ground,
+        arrived: &[Report],
         log: &Log,
     ) -> Outcome {
-        let reports: Vec<Report> = ground.reports().collect();
-        let version = reports.iter().map(|it| it.version).max().unwrap_or(0);
+        for report in arrived {
+            let newest = self.reports.entry(report.relay).or_insert(*report);
+            newest.update(*report);
+        }
+        let reports = &self.reports;
+        let version = reports.values().filter_map(|it| it.version).max();
         let relays = plan.loaded.mission.relays();
         let rows = (1..=relays).map(|index| {
-            let report = reports.iter().find(|it| it.relay == index);
+            let report = reports.get(&index);
             let faults = report.map_or(vec!["no report"], |it| faults(now, it, relays, version));
             (index, report, faults)
         });
@@ -72,17 +82,16 @@ impl Check {
                 let position = it.position.map_or_else(String::new, |at| {
                     format!("{:.0}, {:.0}, {:.0} m", at.x_m, at.y_m, at.altitude_m)
                 });
-                let node = |node: Option<u16>| {
-                    node.map_or_else(|| "-".to_owned(), |node| node.to_string())
-                };
-                let [before, after] = it.neighbours.map(node);
+                let number =
+                    |it: Option<u16>| it.map_or_else(|| "-".to_owned(), |it| it.to_string());
+                let [before, after] = it.neighbours.map(number);
                 let control = it
                     .control
                     .map_or_else(|| "-".to_owned(), |state| format!("{state:?}"));
                 format!(
                     "{control:<9} {position:<20} {:<11} {:<8}",
                     format!("{before}, {after}"),
-                    it.version
+                    number(it.version)
                 )
             });
             let faults = faults.join(", ");
@@ -105,7 +114,7 @@ impl Check {
 }
 
 /// Returns the faults of a relay before flight. An empty list means that the relay is green.
-fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'static str> {
+fn faults(now: Instant, report: &Report, relays: u16, version: Option<u16>) -> Vec<&'static str> {
     let Report {
         relay,
         control,
@@ -126,6 +135,10 @@ fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'sta
         (
             report.other_mission.is_some(),
             "a relay near it has another mission",
+        ),
+        (
+            report.old_epoch.is_some(),
+            "a relay near it has started with an old epoch",
         ),
         (
             report.refuses_setpoint,

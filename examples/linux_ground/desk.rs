@@ -295,7 +295,7 @@ fn clear(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, Stri
     check_age(now, asked.time_s)?;
     let web = parts.web.as_mut();
     let web = web.ok_or("there is no page with the relay: start the station with --web")?;
-    web.clear(now, asked.relay, parts.ground)?;
+    web.clear(now, asked.relay)?;
     Ok(json!({ "relay": asked.relay }).to_string())
 }
 
@@ -318,7 +318,7 @@ fn upload(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, Str
 pub(crate) fn state(
     plan: &Plan,
     shown: Option<&str>,
-    reports: &[Report],
+    reports: &[&Report],
     uploading: Option<&Uploading>,
 ) -> Value {
     let is_sited = plan.sited.is_some();
@@ -334,7 +334,7 @@ pub(crate) fn state(
     let is_adopted = uploading.is_adopted();
     let flying = reports
         .iter()
-        .filter(|it| is_adopted && Some(it.version) == version);
+        .filter(|it| is_adopted && version.is_some() && it.version == version);
     let arrived = flying
         .clone()
         .filter(|it| has_arrived(it))

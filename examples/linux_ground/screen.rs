@@ -5,7 +5,7 @@ use std::sync::mpsc::Receiver;
 
 use serde_json::json;
 use uav_relay::flight::axis::Axis;
-use uav_relay::{Duration, Ground, GuardConfig, Instant, Mission, Upload};
+use uav_relay::{Duration, Ground, GuardConfig, Instant, Mission, Report, Upload};
 use uav_relay_linux::log::Log;
 use uav_relay_screen::chain::Chain;
 use uav_relay_screen::station::{Frames, StationView};
@@ -27,6 +27,8 @@ const ASK_AGAIN: Duration = Duration::from_millis(10_000);
 pub(crate) struct Web {
     screen: Screen,
     view: StationView,
+    /// Reports received since the last snapshot.
+    arrived: Vec<Report>,
     /// Uploaded mission that the chain flies. `None` if the chain flies the mission loaded before flight.
     ///
     /// It is also `None` if the values of the flown mission are unknown.
@@ -75,6 +77,7 @@ impl Web {
         let web = Self {
             screen,
             view: StationView::default(),
+            arrived: Vec::new(),
             flown: None,
             elevation,
             next_at: now,
@@ -87,13 +90,13 @@ impl Web {
     ///
     /// # Errors
     /// The reason if the relay is not lost.
-    pub(crate) fn clear(
-        &mut self,
-        now: Instant,
-        relay: u16,
-        ground: &Ground,
-    ) -> Result<(), String> {
-        self.view.clear(now, relay, ground.reports())
+    pub(crate) fn clear(&mut self, now: Instant, relay: u16) -> Result<(), String> {
+        self.view.clear(now, relay, &self.arrived)
+    }
+
+    /// Stores reports that the station has received, for the next snapshot.
+    pub(crate) fn take(&mut self, reports: &[Report]) {
+        self.arrived.extend(reports);
     }
 
     /// Shows a new snapshot on the page if one is due, without waiting for a browser.
@@ -150,8 +153,8 @@ impl Web {
             received: stats.received.saturating_add(stats.handshakes),
             rejected: ground.refused(),
         };
-        let reports: Vec<_> = ground.reports().collect();
-        let mut snapshot = self.view.snapshot(now, &chain, &reports, frames);
+        let arrived = std::mem::take(&mut self.arrived);
+        let mut snapshot = self.view.snapshot(now, &chain, &arrived, frames);
         let shown = is_known.then(|| name_of(version, upload.as_ref()));
         if let (Some(elevation), Some(sites)) = (&mut self.elevation, sites) {
             let along = elevation.along(sites).unwrap_or_else(|error| {
@@ -160,6 +163,7 @@ impl Web {
             });
             snapshot.ground = along;
         }
+        let reports: Vec<_> = self.view.reports().collect();
         snapshot.desk = Some(state(plan, shown.as_deref(), &reports, uploading));
         self.screen.show(snapshot);
         self.next_at

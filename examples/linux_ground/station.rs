@@ -6,7 +6,7 @@ use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::MAX_FRAME;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Auth, Duration, Ground, Instant, Key, Progress, Upload};
+use uav_relay::{Auth, Duration, Ground, Instant, Key, Progress, Report, Upload};
 use uav_relay_linux::counters::{RejectionReasons, counted};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::replug::Replug;
@@ -120,16 +120,19 @@ impl<'a> Station<'a> {
         let time = self.service.now();
         let log = &self.service.log;
         self.tty.tend(time, log);
-        self.exchange(time);
+        let arrived = self.exchange(time);
         let log = &self.service.log;
         let silent = self.hearing.update(time, &self.ground, log);
         if let Some(why) = self.rejections.next_reason(time, self.ground.stats(), true) {
             log.line(time, "rejected", why);
         }
         let check = self.check.as_mut();
-        let checked = check.and_then(|it| it.turn(time, self.plan, &self.ground, log));
+        let checked = check.and_then(|it| it.turn(time, self.plan, &arrived, log));
         if checked.is_some() {
             return checked;
+        }
+        if let Some(web) = &mut self.web {
+            web.take(&arrived);
         }
         let outcome = self.uploading(time);
         if outcome.is_some() {
@@ -169,15 +172,17 @@ impl<'a> Station<'a> {
         self.sleep(wake.min())
     }
 
-    fn exchange(&mut self, time: Instant) {
+    /// Receives and sends what is due. Returns the received reports.
+    fn exchange(&mut self, time: Instant) -> Vec<Report> {
         let Self { ground, tty, .. } = self;
-        let mut bytes = [0; 256];
+        let (mut bytes, mut reports) = ([0; 256], Vec::new());
         for _ in 0..READS {
             // Errors of the tty are logged by `tend`.
             let Ok(count @ 1..) = tty.read(&mut bytes) else {
                 break;
             };
             ground.handle_bytes(bytes.get(..count).unwrap_or_default());
+            reports.extend(std::iter::from_fn(|| ground.poll_report(time)));
         }
         if let Some(measurements) = &mut self.measurements
             && let Some(power_w) = measurements.newest(time, &self.service.log)
@@ -186,6 +191,7 @@ impl<'a> Station<'a> {
         }
         ground.handle_timeout(time);
         self.send();
+        reports
     }
 
     fn send(&mut self) {

@@ -35,9 +35,10 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 /// Time after which a hello (status request) to the polled relay is repeated if there was no answer.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Maximum number of relays whose reports are stored; all reports together take 11 KB. 0 without the feature
-/// `telemetry`.
-const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
+/// Maximum number of received reports that wait for [`Ground::poll_report`].
+///
+/// Without the feature `telemetry` it is 1, and no report is received.
+const REPORTED: usize = if TELEMETRY { 64 } else { 1 };
 
 /// Interval in which every relay in radio reach is sent one request for the reports of all relays.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
@@ -312,7 +313,7 @@ impl Ground {
             Some(Message::Report(report)) if TELEMETRY => {
                 if report.mission() != self.base {
                     &mut self.stats.mission
-                } else if self.watching.record(report, self.clock.now()) {
+                } else if self.watching.record(report) {
                     &mut self.stats.received
                 } else {
                     &mut self.stats.malformed
@@ -446,7 +447,6 @@ impl Ground {
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if TELEMETRY {
-            self.watching.apply(now);
             let is_silent = self.watching.request(now, self.node.into());
             let to = self.at(self.watching.distance);
             if let Some(session) = self.endpoint.session_mut().filter(|_| is_silent) {
@@ -587,17 +587,14 @@ impl Ground {
         _ = self.watching.request(now, self.node.into());
     }
 
-    /// Returns the newest report of each relay, in the order of the node numbers. At most 128 relays are stored: those
-    /// that reported first.
+    /// Returns the next received report of a relay; `None` if there is none. `now` counts as its arrival.
     ///
-    /// A received report is returned only after the next call of [`handle_timeout`](Self::handle_timeout), whose time
-    /// counts as its arrival. A relay sends details (setpoint, agreed position, neighbours, interference, version) only
-    /// with every eighth report. The returned details are the last ones received.
-    pub fn reports(&self) -> impl Iterator<Item = crate::Report> {
-        let known = self.watching.known.iter();
-        known.map(|known| {
-            crate::Report::of(&known.entry, known.detail, self.clock.external(known.at))
-        })
+    /// Call it after [`handle_bytes`](Self::handle_bytes) until it returns `None`: of more than 64 waiting reports the
+    /// newest are dropped. Keep the newest report of each relay by [`Report::update`](crate::Report::update).
+    pub fn poll_report(&mut self, now: Instant) -> Option<crate::Report> {
+        let mut arrived = core::iter::from_fn(|| self.watching.arrived.pop_front());
+        arrived
+            .find_map(|(entry, detail)| Some(crate::Report::of(&entry, detail, entry.time(now)?)))
     }
 }
 
@@ -619,18 +616,9 @@ struct Watching {
     is_due: bool,
     /// Bit mask of relays. A relay's bit is set if it has sent a message to this station since the last request to it.
     heard: u8,
-    /// Report entries received since the last call of [`apply`](Self::apply). That call sets their arrival time.
-    arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
-    /// Newest known state of every relay that has reported, in the order of the node numbers.
-    known: heapless::Vec<KnownState, REPORTED>,
-}
-
-/// Newest known state of a relay, and its last received details. `at` is the time of the state by the station's clock.
-#[derive(Clone, Debug)]
-struct KnownState {
-    at: Instant,
-    entry: Entry,
-    detail: Option<Detail>,
+    /// True after the first report.
+    has_report: bool,
+    arrived: heapless::Deque<(Entry, Option<Detail>), REPORTED>,
 }
 
 impl Watching {
@@ -654,8 +642,8 @@ impl Watching {
             distance: 0,
             is_due: false,
             heard: 0,
-            arrived: heapless::Vec::new(),
-            known: heapless::Vec::new(),
+            has_report: false,
+            arrived: heapless::Deque::new(),
         }
     }
 
@@ -669,11 +657,7 @@ impl Watching {
             return false;
         }
         // The first agreement needs the channel.
-        let overheard = if self.known.is_empty() {
-            0
-        } else {
-            self.overheard
-        };
+        let overheard = if self.has_report { self.overheard } else { 0 };
         let is_near = move |it: &u16| *it <= CANDIDATES || overheard & bit(*it) != 0;
         // Two stations do not request at the same time again and again.
         let cycle = WATCH_EVERY.as_micros() + 100_000 * (node % 7);
@@ -704,40 +688,16 @@ impl Watching {
 
     /// Records the entries of a report. Returns false, and records none, if an entry has a node number outside the
     /// mission.
-    fn record(&mut self, report: &Reports, now: Instant) -> bool {
+    fn record(&mut self, report: &Reports) -> bool {
         let (mut detail, entries) = report.states();
         if entries.iter().any(|entry| entry.relay() > self.all) {
             return false;
         }
         for entry in entries {
-            if self.arrived.is_full() {
-                self.apply(now);
-            }
-            _ = self.arrived.push((*entry, detail.take()));
+            self.has_report = true;
+            _ = self.arrived.push_back((*entry, detail.take()));
         }
         true
-    }
-
-    /// Merges the received report entries into the newest report of every relay. `now` is their arrival time.
-    fn apply(&mut self, now: Instant) {
-        for (entry, detail) in &self.arrived {
-            let Some(at) = entry.time(now) else {
-                continue;
-            };
-            let (entry, detail) = (*entry, *detail);
-            match (self.known).binary_search_by_key(&entry.relay(), |known| known.entry.relay()) {
-                Ok(index) => {
-                    if let Some(known) = self.known.get_mut(index)
-                        && at > known.at
-                    {
-                        let detail = detail.or(known.detail);
-                        *known = KnownState { at, entry, detail };
-                    }
-                }
-                Err(index) => _ = self.known.insert(index, KnownState { at, entry, detail }),
-            }
-        }
-        self.arrived.clear();
     }
 }
 

@@ -1,6 +1,7 @@
 //! Frames to and from the protocol. Address and tag of a frame are checked before its message is decoded.
 
 use super::Port;
+use crate::event::NodeEvent;
 use crate::node::Node;
 use crate::side::Side;
 use crate::stats::bump;
@@ -120,7 +121,7 @@ fn receive_signed(
         Checked::Unproven => node.on_handshake(side, sender),
         // While the two nodes do not know each other's nonces, the tag of any frame other than a handshake is wrong.
         Checked::Forged if frame.handshake => node.on_forged(now, side, sender),
-        Checked::WentBack => node.on_epoch_went_back(side, sender),
+        Checked::WentBack => node.refuse(now, side, sender, NodeEvent::Epoch),
         Checked::Unsigned | Checked::Forged | Checked::Replayed => {}
     }
 }

@@ -108,8 +108,8 @@ struct OlderHandshakes {
 }
 
 impl OlderHandshakes {
-    /// Counts a handshake with an outdated nonce, its epoch and its frame counter; ignores replays. Returns true at the
-    /// fifth (`WENT_BACK`) successive handshake of the same epoch with rising frame counters.
+    /// Counts a handshake with an outdated nonce, its epoch and its frame counter; ignores replays. Returns true
+    /// from the fifth (`WENT_BACK`) successive handshake of the same epoch with rising frame counters on.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -124,7 +124,7 @@ impl OlderHandshakes {
         }
         self.next = counter.saturating_add(1);
         self.times = self.times.saturating_add(1);
-        self.times == WENT_BACK
+        self.times >= WENT_BACK
     }
 }
 
@@ -179,7 +179,7 @@ pub(crate) enum Checked {
     /// Frame with a valid tag that was received before. Also a frame with a counter too old for the check of
     /// duplicates.
     Replayed,
-    /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
+    /// Fifth or later outdated handshake in a row. It proves that the node's epoch went back or was used twice.
     WentBack,
 }
 

@@ -367,7 +367,7 @@ impl<'a> Recorder<'a> {
                 _ => None,
             };
             // The captures may not show that the relay was lost.
-            if cleared.is_none_or(|relay| self.view.clear(instant(now), relay, []).is_err()) {
+            if cleared.is_none_or(|relay| self.view.clear(instant(now), relay, &[]).is_err()) {
                 flight.log.push(LogLine {
                     time_s: frame.at - flight.begin,
                     text: format!("operator: {act}"),

@@ -62,8 +62,8 @@ pub fn page(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String
     index
         .replacen("</head>", &head, 1)
         .replacen(
-            "<main>",
-            &format!("{}<main>", report(flight, files, warnings)),
+            "</main>",
+            &format!("</main>\n{}", report(flight, files, warnings)),
             1,
         )
         .replacen("</body>", &format!("{BAR}{data}{scripts}</body>"), 1)

@@ -11,7 +11,7 @@
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
-//! | a relay refuses another one for another mission or key, and that one does not report; or reports, but is refused for another mission for `LINGERS` more: a second node has its number | warning or critical, one for the refused relay |
+//! | a relay refuses another one for another mission, old epoch or key, and that one does not report; or reports, but is refused for another mission for `LINGERS` more: a second node has its number | warning or critical, one for the refused relay |
 //! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
@@ -185,7 +185,7 @@ impl Known {
     }
 }
 
-/// Refusal of a relay for another mission or key.
+/// Refusal of a relay for another mission, an old epoch or another key.
 #[derive(Debug)]
 struct Refused {
     /// Relays that refuse the refused relay, and the times of their last reports of the refusal.
@@ -223,6 +223,11 @@ pub struct StationView {
 }
 
 impl StationView {
+    /// Returns the newest report of each relay that is not cleared, with the details last received.
+    pub fn reports(&self) -> impl Iterator<Item = &Report> {
+        self.shown().map(|it| &it.report)
+    }
+
     /// Returns the newest version of the mission that relays report; `None` until a report has a version.
     pub fn version(&self) -> Option<u16> {
         self.version.map(|(version, _)| version)
@@ -234,14 +239,9 @@ impl StationView {
     ///
     /// # Errors
     /// The reason if the relay is not lost: it has reported within [`SILENT_AFTER`], or has no alarm that it is lost.
-    pub fn clear(
-        &mut self,
-        now: Instant,
-        relay: u16,
-        reports: impl IntoIterator<Item = Report>,
-    ) -> Result<(), String> {
-        let known = self.known.get(&relay).map(|it| it.report);
-        let own = reports.into_iter().chain(known);
+    pub fn clear(&mut self, now: Instant, relay: u16, reports: &[Report]) -> Result<(), String> {
+        let known = self.known.get(&relay).map(|it| &it.report);
+        let own = reports.iter().chain(known);
         let newest = own.filter(|it| it.relay == relay).map(|it| it.at).max();
         let is_silent = newest.is_some_and(|at| now.since(at) >= SILENT_AFTER);
         if !is_silent || !self.alarms.lasts(Reason::Lost, relay) {
@@ -257,7 +257,7 @@ impl StationView {
 
     /// Returns the state of `chain` at the time `now`, its alarms, and the log since the last call.
     ///
-    /// `reports` are the relays' newest reports. Reports of relays with a number above `chain.relays` are ignored.
+    /// `reports` are the reports received since the last snapshot; older ones may be included. Reports of relays with a number above `chain.relays` are ignored.
     pub fn snapshot<'a>(
         &mut self,
         now: Instant,
@@ -278,7 +278,7 @@ impl StationView {
         self.follow_refusals(now);
         let lasting = self.lasting(now, chain);
         self.alarms.settle(seconds(now), lasting);
-        let reports: Vec<Report> = self.shown().map(|it| it.report).collect();
+        let reports: Vec<Report> = self.reports().copied().collect();
         let cleared: Vec<u16> = self.cleared.keys().copied().collect();
         let changed = self.known.iter();
         let changed = changed.map(|(number, it)| (*number, it.neighbours_at));
@@ -295,9 +295,11 @@ impl StationView {
     fn take(&mut self, now: Instant, report: Report, log: &mut Vec<LogLine>) -> bool {
         let number = report.relay;
         let before = self.known.get(&number).map(|it| it.report);
-        if before.is_some_and(|before| before.at >= report.at) {
+        let mut newest = before.unwrap_or(report);
+        if before.is_some() && !newest.update(report) {
             return false;
         }
+        let report = newest;
         let line = |text| LogLine {
             time_s: seconds(report.at),
             text: format!("relay {number}: {text}"),
@@ -327,8 +329,8 @@ impl StationView {
     /// Updates the newest version of the mission according to the relays' recent reports.
     fn follow_version(&mut self, now: Instant) {
         let reports = self.known.values().map(|it| it.report);
-        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER && has_details(it));
-        if let Some(newest) = fresh.map(|it| it.version).max()
+        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER);
+        if let Some(newest) = fresh.filter_map(|it| it.version).max()
             && self.version() != Some(newest)
         {
             self.version = Some((newest, now));
@@ -376,6 +378,7 @@ impl StationView {
             let refusals = [
                 (Reason::Mission, by.other_mission),
                 (Reason::Key, by.other_key),
+                (Reason::Epoch, by.old_epoch),
             ];
             let named = refusals
                 .into_iter()
@@ -452,7 +455,7 @@ impl StationView {
             add(Reason::Rejected, 0, Vec::new(), note);
         }
         for ((reason, number), it) in &self.refused {
-            // Reports of a relay with another mission or key do not reach this station.
+            // Reports of a refused relay do not reach this station.
             let lasts = it
                 .back_at
                 .is_none_or(|back_at| *reason == Reason::Mission && now.since(back_at) >= LINGERS);
@@ -497,10 +500,8 @@ impl StationView {
             for (reason, _) in own.into_iter().filter(|(_, is)| *is) {
                 add(reason, number, vec![number], String::new());
             }
-            let version = known.report.version;
-            if let Some((newest, since)) = self.version
+            if let (Some((newest, since)), Some(version)) = (self.version, known.report.version)
                 && version != newest
-                && has_details(&known.report)
                 && known.report.at.since(since) >= SILENT_AFTER
             {
                 let note = format!(": version {version}, other relays version {newest}");
@@ -557,11 +558,6 @@ fn distance_to_fly_m(report: &Report) -> Option<f32> {
     flies.then(|| way_m.hypot(at.altitude_m - to.altitude_m))
 }
 
-/// Returns true if the report has details. Most reports contain only position and control state.
-fn has_details(report: &Report) -> bool {
-    report.agreed.is_some() || report.neighbours.iter().any(Option::is_some)
-}
-
 /// Returns the neighbours that a relay reports as silent.
 fn silent(report: &Report) -> impl Iterator<Item = u16> {
     let pairs = report.neighbours.into_iter().zip(report.silent);
@@ -613,8 +609,10 @@ fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
             all => format!("neighbours: {}", named(all)),
         });
     }
-    if old.version != new.version {
-        lines.push(format!("flies version {} of the mission", new.version));
+    if let Some(version) = new.version
+        && version != old.version.unwrap_or(0)
+    {
+        lines.push(format!("flies version {version} of the mission"));
     }
     lines
 }

@@ -39,8 +39,9 @@ fn healthy(relay: u16, relays: u16) -> Report {
         refuses_setpoint: false,
         other_mission: None,
         other_key: None,
+        old_epoch: None,
         interference_w: None,
-        version: 0,
+        version: Some(0),
     }
 }
 
@@ -115,7 +116,8 @@ impl Watched {
             "off" => _ = self.off.insert(relay),
             "ok" => {
                 let Report { version, at, .. } = *report;
-                (*report, report.version, report.at) = (healthy(relay, self.of), version, at);
+                (*report, report.version, report.at) =
+                    (healthy(relay, self.of), version.or(Some(0)), at);
             }
             "noquorum" => report.phase = Phase::NoQuorum,
             "infeasible" => report.phase = Phase::Infeasible,
@@ -131,9 +133,9 @@ impl Watched {
             "restarted" => (report.agreed, report.setpoint) = (None, None),
             "brief" => {
                 (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
-                report.version = 0;
+                report.version = None;
             }
-            "version2" => report.version = 2,
+            "version2" => report.version = Some(2),
             "nonext" => report.neighbours[1] = None,
             "noback" => report.neighbours[0] = None,
             "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),
@@ -142,6 +144,7 @@ impl Watched {
             "duplicated" => report.is_duplicated = true,
             "refuses" => report.refuses_setpoint = true,
             "key2" => report.other_key = Some(2),
+            "epoch2" => report.old_epoch = Some(2),
             "mission2" => report.other_mission = Some(2),
             "mission4" => report.other_mission = Some(4),
             "deafback" => report.silent[0] = true,
@@ -303,7 +306,7 @@ fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
     watched.second();
     let clear = |watched: &mut Watched, relay| {
         let now = Instant::from_millis(1_000 * watched.second);
-        watched.view.clear(now, relay, [])
+        watched.view.clear(now, relay, &[])
     };
     for relay in [0, 3, 9] {
         assert!(clear(&mut watched, relay).is_err(), "{relay} is not lost");
@@ -323,7 +326,7 @@ fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
             at,
             ..healthy(relay, RELAYS)
         };
-        let reply = watched.view.clear(now, 3, [report]);
+        let reply = watched.view.clear(now, 3, &[report]);
         assert_eq!(reply.is_err(), is_refused);
     }
     let late = watched.relays.get(&3).copied().unwrap();

@@ -116,7 +116,12 @@ const SCRIPT: [&[Fault]; 14] = [
         ("kill", 8, LOST, "relay # toward"),
     ],
     &[("stop", 5, LOST, "relay # toward")],
-    &[("epoch", 6, LOST, "relay # has started with an epoch")],
+    &[(
+        "epoch",
+        6,
+        "critical relay # started with an old epoch",
+        "relay # has started with an epoch",
+    )],
     &[(
         "key",
         3,
@@ -140,7 +145,7 @@ fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
     for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(times) {
         let own_s = own.map_or("not before the alarm".to_owned(), |it| format!("{it:.1} s"));
         println!("{what} {relay}: noticed by a companion: {own_s}; alarm: {shown:.1?} s");
-        // The neighbours give a lost relay up later than the station misses its reports. But they notice an old epoch earlier.
+        // The neighbours give a lost relay up later than the station misses its reports.
         let [least_s, most_s] = if *alarm == LOST {
             [SILENT_S, LOST_S]
         } else {

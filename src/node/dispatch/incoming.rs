@@ -142,12 +142,22 @@ impl Node {
 
     pub(super) fn refuse_mission(&mut self, now: Instant, side: Side, from: u16) {
         bump(&mut self.telemetry.stats.mission);
+        self.refuse(now, side, from, NodeEvent::Mission);
+    }
+
+    /// Records that this relay refuses node `from` at `side`.
+    ///
+    /// The node is reported to the firmware at most once a minute. `reason` is [`NodeEvent::Mission`], [`NodeEvent::Epoch`] or [`NodeEvent::Key`]. If this relay refused no node
+    /// before, its next report to a ground station is early.
+    pub(crate) fn refuse(&mut self, now: Instant, side: Side, from: u16, reason: NodeEvent) {
         let distance = from.abs_diff(self.member.node);
         let before = self.refusals(now);
         let neighbour = self.layers.neighbours.at_mut(side);
-        if neighbour.should_report_mismatch(distance, now) {
-            self.report_refusal(now, before);
-            self.raise_node_event(NodeEvent::Mission, side, from);
+        if neighbour.refusals.add(reason, distance, now) {
+            if before == [0; 2] && self.refusals(now) != [0; 2] {
+                self.reporting.schedule(&self.member, true);
+            }
+            self.raise_node_event(reason, side, from);
         }
     }
 
@@ -263,24 +273,16 @@ impl Node {
     /// handshakes in a row the node is reported to the firmware.
     pub(crate) fn on_forged(&mut self, now: Instant, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
-        let before = self.refusals(now);
         let neighbour = self.layers.neighbours.at_mut(side);
-        let is_news = neighbour.should_report_forged(distance, now);
-        self.report_refusal(now, before);
-        if is_news {
-            self.raise_node_event(NodeEvent::Key, side, from);
+        if neighbour.count_forged(distance) {
+            self.refuse(now, side, from, NodeEvent::Key);
         }
     }
 
-    /// Records that node `from` at `side` signs with the same key as this relay.
+    /// Records that node `from` at `side` signs with the same key as this relay, and with a new epoch.
     pub(crate) fn on_key_match(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         self.layers.neighbours.at_mut(side).on_key_match(distance);
-    }
-
-    /// Reports that node `from` at `side` signs with an older epoch (start counter) than before.
-    pub(crate) fn on_epoch_went_back(&mut self, side: Side, from: u16) {
-        self.raise_node_event(NodeEvent::Epoch, side, from);
     }
 }
 

@@ -88,7 +88,7 @@ impl Node {
         )
     }
 
-    /// Returns the nearest nodes with a wrong mission or key, toward Tx and toward Rx; 0 for none.
+    /// Returns the nearest nodes with a wrong mission, epoch or key, toward Tx and toward Rx; 0 for none.
     ///
     /// The values are those of [`Entry::refusal`](crate::wire::message::Entry::refusal). Tx and Rx do not count,
     /// because ground stations are no relays. Without the cargo feature `telemetry` both values are 0.
@@ -98,23 +98,18 @@ impl Node {
         }
         let [before, after] = [Side::Upstream, Side::Downstream].map(|side| {
             let neighbour = self.layers.neighbours.at(side);
-            neighbour.refused(now, self.member.relays_to_end(side))
+            neighbour
+                .refusals
+                .nearest(now, self.member.relays_to_end(side))
         });
-        let mut kinds = before.into_iter().zip(after).zip([0, 2 * CANDIDATES]);
-        // A mission is refused by its signed digest; the other key may be a forger's.
+        let firsts = [0, 4 * CANDIDATES, 2 * CANDIDATES];
+        let mut kinds = before.into_iter().zip(after).zip(firsts);
+        // Missions and epochs are refused by signed frames; the other key may be a forger's.
         let kind = kinds.find(|(nodes, _)| *nodes != (0, 0));
         kind.map_or([0; 2], |((before, after), first)| {
             let numbered = |distance, first| if distance == 0 { 0 } else { first + distance };
             [numbered(before, first), numbered(after, first + CANDIDATES)]
         })
-    }
-
-    /// Schedules an early report if this relay now refuses a node, and refused none before. A node is refused for a
-    /// wrong mission or a wrong key. `before` has the earlier result of [`Self::refusals`].
-    pub(super) fn report_refusal(&mut self, now: Instant, before: [u16; 2]) {
-        if before == [0; 2] && self.refusals(now) != [0; 2] {
-            self.reporting.schedule(&self.member, true);
-        }
     }
 }
 
@@ -122,6 +117,7 @@ impl Node {
 #[cfg(all(feature = "telemetry", feature = "upload"))]
 mod tests {
     use super::*;
+    use crate::event::NodeEvent;
     use crate::mission::Mission;
     use crate::mission::tests::paper;
     use crate::node::dispatch::tests::{NOW, relay_of};
@@ -452,9 +448,34 @@ mod tests {
         // Tx is a ground station.
         (0..3).for_each(|_| node.on_forged(NOW + ms(240_000), Side::Upstream, 0));
         assert_eq!(node.refusals(NOW + ms(240_000)), [0, 0]);
-        // A refused mission comes first.
+        // A refused mission comes first, then an old epoch.
         forge(&mut node, NOW + ms(250_000), 3);
+        node.refuse(NOW + ms(250_000), Side::Upstream, 1, NodeEvent::Epoch);
+        assert_eq!(node.refusals(NOW + ms(250_000)), [18, 0]);
         foreign(&mut node, NOW + ms(250_000), 4);
         assert_eq!(node.refusals(NOW + ms(250_000)), [0, 5]);
+    }
+
+    /// Checks that an old epoch is reported ahead of the turn, until a new epoch is received.
+    #[test]
+    fn an_old_epoch_is_reported_at_once_until_a_new_one() {
+        let mut node = watched(3, Wiring::Shared);
+        let now = NOW + ms(1_000);
+        node.reporting.handle_timeout(now);
+        for second in 0..300 {
+            let now = now + ms(1_000 * second);
+            node.refuse(now, Side::Downstream, 5, NodeEvent::Epoch);
+            assert_eq!(node.refusals(now), [0, 22]);
+            if second == 0 {
+                let (after, report) = next(&mut node, now, ms(5_000)).unwrap();
+                let own = report.entries.first().unwrap();
+                assert_eq!((own.relay(), own.refusal()), (3, 22));
+                assert!(after <= ms(160), "{after:?}");
+            }
+        }
+        let last = now + ms(299_000);
+        assert_eq!(node.refusals(last + ms(59_000)), [0, 22]);
+        node.on_key_match(Side::Downstream, 5);
+        assert_eq!(node.refusals(last), [0, 0]);
     }
 }

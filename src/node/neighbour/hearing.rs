@@ -1,5 +1,6 @@
 //! Nodes on one side of a relay: recently received nodes, consecutive events, and pending hellos.
 
+use crate::event::NodeEvent;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
@@ -45,9 +46,9 @@ struct RecentBits {
     /// Start of the current period.
     since: Instant,
     /// Bits that were set in the current period.
-    current: u8,
+    current: u16,
     /// Bits that were set in the previous period.
-    previous: u8,
+    previous: u16,
 }
 
 impl RecentBits {
@@ -60,19 +61,19 @@ impl RecentBits {
     }
 
     /// Sets `bits` at `now`. Returns true if any of them was not yet set in the current period.
-    fn set(&mut self, bits: u8, now: Instant, period: Duration) -> bool {
+    fn set(&mut self, bits: u16, now: Instant, period: Duration) -> bool {
         self.expire(now, period);
         let new = bits & !self.current;
         self.current |= new;
         new != 0
     }
 
-    const fn clear(&mut self, bits: u8) {
+    const fn clear(&mut self, bits: u16) {
         self.current &= !bits;
         self.previous &= !bits;
     }
 
-    fn get(mut self, now: Instant, period: Duration) -> u8 {
+    fn get(mut self, now: Instant, period: Duration) -> u16 {
         self.expire(now, period);
         self.current | self.previous
     }
@@ -97,49 +98,54 @@ impl Hearing {
     }
 
     pub(super) fn add(&mut self, distance: u16, now: Instant, settings: &Settings) {
-        self.0.set(mask(distance), now, settings.probe_after);
+        let bit = u16::from(mask(distance));
+        self.0.set(bit, now, settings.probe_after);
     }
 
     /// Returns a bit mask of the recently received nodes; bit 0 is the nearest node. A node stays in the mask for one
     /// to two times `probe_after` after its last frame.
     pub(super) fn recent(self, now: Instant, settings: &Settings) -> u8 {
-        self.0.get(now, settings.probe_after)
+        let [nodes, _] = self.0.get(now, settings.probe_after).to_le_bytes();
+        nodes
     }
 }
 
-/// Nodes on one side of the relay that recently used a wrong mission or a wrong key.
+/// Nodes on one side of the relay that recently used a wrong mission, an old epoch or a wrong key.
 ///
-/// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with a wrong key; the nearest node is first.
-/// A bit remains set for one to two minutes.
+/// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with an old epoch, bits 8 to 11 for nodes
+/// with a wrong key; the nearest node is first. A bit remains set for one to two minutes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Refusals(RecentBits);
+pub(crate) struct Refusals(RecentBits);
 
 impl Refusals {
     pub(super) const NONE: Self = Self(RecentBits::new(Instant::ZERO));
 
-    /// Records a message with a different mission than this relay's from the node `distance` relays away. Returns true
-    /// at most once a minute for each node.
-    pub(super) fn add_mission(&mut self, distance: u16, now: Instant) -> bool {
-        self.0.set(mask(distance), now, MINUTE)
-    }
-
-    /// Records a handshake with a wrong key from the node `distance` relays away.
-    pub(super) fn add_key(&mut self, distance: u16, now: Instant) {
-        self.0.set(mask(distance) << CANDIDATES, now, MINUTE);
-    }
-
-    /// Records that the node `distance` relays away uses this relay's key.
-    pub(super) fn remove_key(&mut self, distance: u16) {
-        self.0.clear(mask(distance) << CANDIDATES);
-    }
-
-    /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
+    /// Records a wrong mission, an old epoch or a wrong key of the node `distance` relays away.
     ///
-    /// Nodes `end` or more relays away are left out.
-    pub(super) fn nearest(self, now: Instant, end: u16) -> [u16; 2] {
+    /// Returns true at most once a minute for each node and reason.
+    pub(crate) fn add(&mut self, reason: NodeEvent, distance: u16, now: Instant) -> bool {
+        let first = match reason {
+            NodeEvent::Mission => 0,
+            NodeEvent::Epoch => CANDIDATES,
+            _ => 2 * CANDIDATES,
+        };
+        self.0.set(u16::from(mask(distance)) << first, now, MINUTE)
+    }
+
+    /// Records that the node `distance` relays away uses this relay's key and a new epoch.
+    pub(super) fn remove_signer(&mut self, distance: u16) {
+        self.0.clear(u16::from(mask(distance)) * 0x110);
+    }
+
+    /// Returns the distances of the nearest nodes that are refused; 0 for none.
+    ///
+    /// The values are for a wrong mission, an old epoch, and a wrong key, in this order. Nodes `end` or more relays
+    /// away are left out.
+    pub(crate) fn nearest(self, now: Instant, end: u16) -> [u16; 3] {
         let nodes = self.0.get(now, MINUTE);
-        [nodes & 0x0F, nodes >> CANDIDATES].map(|nodes| {
-            #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+        [0, CANDIDATES, 2 * CANDIDATES].map(|first| {
+            let nodes = nodes >> first & 0x0F;
+            #[expect(clippy::cast_possible_truncation, reason = "at most 16")]
             let distance = nodes.trailing_zeros() as u16 + 1;
             if nodes == 0 || distance >= end {
                 0

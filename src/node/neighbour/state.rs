@@ -37,7 +37,6 @@ use super::damping::Damping;
 use super::hearing::Hellos;
 use super::hearing::{CANDIDATES, ConsecutiveCounts, Hearing, Refusals, mask};
 use super::liveness::{Liveness, patience, tick};
-use crate::features::TELEMETRY;
 use crate::node::context::Proposer;
 use crate::node::context::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
@@ -92,8 +91,8 @@ pub(crate) struct Neighbour {
     pub(super) not_received: ConsecutiveCounts,
     /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Bit 0 is the nearest node.
     reported_found: u8,
-    /// Nodes on this side of the relay whose mission or key it has recently refused.
-    refusals: Refusals,
+    /// Nodes on this side of the relay whose mission, epoch or key it has recently refused.
+    pub(crate) refusals: Refusals,
     /// Number of consecutive handshakes with a wrong key, for each node on this side of the relay.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
@@ -728,34 +727,17 @@ impl Neighbour {
         self.not_received.count(distance, !received, NOT_RECEIVED)
     }
 
-    /// Returns true if the wrong mission of the node `distance` relays away must be reported now.
-    ///
-    /// This is reported at most once a minute for each node.
-    pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
-        self.refusals.add_mission(distance, now)
+    /// Counts a handshake with a wrong key from the node `distance` relays away. Returns true from the third ([`FORGED`])
+    /// such handshake in a row on.
+    pub(crate) fn count_forged(&mut self, distance: u16) -> bool {
+        self.forged.count(distance, true, FORGED);
+        self.forged.has(distance, FORGED)
     }
 
-    /// Returns the distances of the nearest nodes with a wrong mission and with a wrong key; 0 for none.
-    ///
-    /// A wrong mission or key is remembered for one to two minutes. Nodes `end` or more relays away are left out.
-    pub(crate) fn refused(&self, now: Instant, end: u16) -> [u16; 2] {
-        self.refusals.nearest(now, end)
-    }
-
-    /// Counts a handshake with a wrong key from the node `distance` relays away. Returns true once, after [`FORGED`]
-    /// such handshakes in a row.
-    pub(crate) fn should_report_forged(&mut self, distance: u16, now: Instant) -> bool {
-        let is_news = self.forged.count(distance, true, FORGED);
-        if TELEMETRY && self.forged.has(distance, FORGED) {
-            self.refusals.add_key(distance, now);
-        }
-        is_news
-    }
-
-    /// Resets the count of wrong keys of the node `distance` relays away, which has used this relay's key.
+    /// Resets the refusals for key and epoch of the node `distance` relays away: both are right now.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
-        self.refusals.remove_key(distance);
+        self.refusals.remove_signer(distance);
     }
 }
 

@@ -20,9 +20,9 @@ const STATES: u16 = 57_344;
 
 /// Number of values of [`Entry::refusal`].
 ///
-/// 0 means no refusal. Values 1 to 8 mean a refused node with another mission, 9 to 16 one with another key. Each group
-/// has four values for nodes toward Tx and four for nodes toward Rx.
-const REFUSALS: u16 = 17;
+/// 0 means no refusal. Values 1 to 8 mean a refused node with another mission, 9 to 16 one with another key, 17 to 24
+/// one with an old epoch. Each group has four values for nodes toward Tx and four for nodes toward Rx.
+const REFUSALS: u16 = 25;
 
 /// Upper 16 bits of the largest finite f32.
 const LARGEST: u16 = 0x7F7F;
@@ -108,7 +108,8 @@ impl Entry {
     /// Returns direction and distance of the nearest node that the relay refuses; 0 for none.
     ///
     /// 1 to 4: another mission, at a node whose number is smaller by 1 to 4 (toward Tx). 5 to 8: another mission, at a
-    /// node whose number is larger by 1 to 4 (toward Rx). 9 to 16: the same for another key.
+    /// node whose number is larger by 1 to 4 (toward Rx). 9 to 16: the same for another key. 17 to 24: the same for an
+    /// old epoch.
     pub const fn refusal(&self) -> u16 {
         self.relay.number().saturating_sub(1) / MAX_RELAYS
     }

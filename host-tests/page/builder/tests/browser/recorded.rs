@@ -135,11 +135,8 @@ fn the_report_and_the_time_bar_fit_a_phone_and_a_wall() {
         browser.until("document.readyState === 'complete' && map.frames > 0");
         browser.run("seek(150)");
         browser.until("map.pending === 0");
-        let over = number(
-            &mut browser,
-            "document.documentElement.scrollWidth - window.innerWidth",
-        );
-        assert!(over <= 0.0, "{width}: {over} px too wide");
+        let is = number(&mut browser, "document.documentElement.scrollWidth");
+        assert!(is <= f64::from(width), "{width}: {is} px wide");
         let bar = number(
             &mut browser,
             "window.innerHeight - byId('replay').getBoundingClientRect().bottom",
@@ -148,6 +145,18 @@ fn the_report_and_the_time_bar_fit_a_phone_and_a_wall() {
             bar.abs() < 1.0,
             "{width}: the time bar is {bar} px above the window's end"
         );
+        if width > 900 {
+            let covered = "document.querySelector('.legend').getBoundingClientRect().bottom - byId('replay').getBoundingClientRect().top";
+            let covered = number(&mut browser, covered);
+            assert!(
+                covered <= 0.0,
+                "{width}: the bar covers {covered} px of the legend"
+            );
+            let share = "byId('chart').getBoundingClientRect().width / byId('report').clientWidth";
+            let share = number(&mut browser, share);
+            assert!(share > 0.95, "{width}: the chart has {share} of the width");
+        }
+        save(&format!("{width}-{scheme}-seen"), &browser.seen());
         save(&format!("{width}-{scheme}"), &browser.screenshot());
         browser.passes_axe(&format!("replay, {width} px, {scheme}"));
         assert_eq!(browser.errors(), Vec::<String>::new());

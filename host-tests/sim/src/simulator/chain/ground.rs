@@ -1,5 +1,7 @@
 //! Ground stations of a run: uploads, measurements and telemetry.
 
+use std::collections::BTreeMap;
+
 use rand::RngExt;
 use uav_relay::ground::{Ground, Progress};
 use uav_relay::sensing::estimate::NumberedEstimate;
@@ -58,7 +60,7 @@ impl Chain {
     pub fn reports(&self, end: Side) -> Vec<Report> {
         let mut stations = self.stations.iter();
         let station = stations.find(|station| station.end == end);
-        station.map_or(Vec::new(), |station| station.ground.reports().collect())
+        station.map_or(Vec::new(), |it| it.reports.values().copied().collect())
     }
 
     /// Passes received bytes to the ground station `at` (from 0) and sends its replies.
@@ -67,6 +69,10 @@ impl Chain {
             station.ground.handle_bytes(bytes);
             if !self.setup.watches.is_empty() {
                 station.ground.handle_timeout(self.now);
+            }
+            while let Some(report) = station.ground.poll_report(self.now) {
+                let newest = station.reports.entry(report.relay).or_insert(report);
+                newest.update(report);
             }
         }
         self.drain_station(at);
@@ -192,6 +198,8 @@ pub(super) struct Station {
     pub(super) ground: Ground,
     pub(super) line: Line,
     pub(super) wake: Option<Instant>,
+    /// Newest report of each relay. The key is the relay's number.
+    reports: BTreeMap<u16, Report>,
 }
 
 impl Station {
@@ -229,6 +237,7 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
             ground: Ground::new(&setup.mission, end, NETWORK, setup.settings.wiring, proof),
             line: Line::default(),
             wake: None,
+            reports: BTreeMap::new(),
         })
         .collect()
 }

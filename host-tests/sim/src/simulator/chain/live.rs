@@ -93,8 +93,9 @@ impl Chain {
                 refuses_setpoint: false,
                 other_mission: None,
                 other_key: None,
+                old_epoch: None,
                 interference_w: None,
-                version: relay.version(),
+                version: Some(relay.version()),
             };
             LiveRelay {
                 report,
