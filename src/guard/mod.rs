@@ -94,7 +94,7 @@ mod follower;
 mod own;
 mod owner;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use crate::place::Placement;
 use crate::side::Side;
@@ -248,6 +248,11 @@ impl Guard {
     /// that relay then move as near to it as its position permits, so that its neighbours can close up to it.
     pub const fn set_leaver(&mut self, node: u16) {
         self.own.leaver = node;
+    }
+
+    #[cfg(all(test, feature = "departures"))]
+    pub(crate) const fn leaver(&self) -> u16 {
+        self.own.leaver
     }
 
     /// Handles a message about a fence (limit of x) from node `from`, a neighbour at `side`.

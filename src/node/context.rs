@@ -375,6 +375,14 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
+/// Returns the duration of the motion to a newly agreed position.
+pub(crate) const fn respacing(settings: &Settings) -> Duration {
+    #[cfg(feature = "departures")]
+    return settings.respacing;
+    #[cfg(not(feature = "departures"))]
+    return settings.dead_after.times(0);
+}
+
 /// Returns the maximum time from the leader's first message along the chain until its result returns.
 ///
 /// The chain has `all` relays, and loses half of its frames.

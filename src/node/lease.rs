@@ -46,7 +46,7 @@
 use super::circulation::{Circulation, Reply};
 use super::context::OtherLeases;
 use super::context::{Context, Effects, LayerEvent, Peer};
-use super::context::{PAUSE, earliest, longest_lease, tenths};
+use super::context::{PAUSE, earliest, longest_lease, respacing, tenths};
 use crate::features::DEPARTURES;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -112,6 +112,8 @@ struct Departures {
     ///
     /// All are in place if two renewals in a row report it. The time is that of the leader.
     settled_at: Instant,
+    /// True if the last renewal has reported that all relays of the view are in place.
+    reported: bool,
     /// Time at which the last relay answered this view's first lease renewal, as estimated by this relay. `None` until
     /// this renewal has completed.
     turned_at: Option<Instant>,
@@ -143,6 +145,7 @@ impl Lease {
                 complement: 0,
                 leaver: (0, now),
                 settled_at: now,
+                reported: false,
                 turned_at: None,
             }; DEPARTURES as usize],
         }
@@ -160,6 +163,11 @@ impl Lease {
         self.orders
     }
 
+    #[cfg(all(test, feature = "departures"))]
+    pub(crate) const fn set_orders(&mut self, orders: Orders) {
+        self.orders = orders;
+    }
+
     /// Returns true if all relays of the view have provably received the leader's last orders.
     pub(crate) fn has_completed(&self) -> bool {
         self.current.is_some() && !self.circulation.is_outstanding()
@@ -171,8 +179,8 @@ impl Lease {
     /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
     /// it joins first, unless the view already has more relays than before the request to leave.
     ///
-    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease, counted from the
-    /// first agreement in this view, or from the last time that all were in place. A relay waits for its order to leave
+    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration of
+    /// a motion, counted from the first agreement in this view, or from the last time that all were in place. A relay waits for its order to leave
     /// at most this maximum duration, and at most its remaining endurance. So at least half of the endurance at the
     /// first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
@@ -181,10 +189,12 @@ impl Lease {
         };
         let (now, most) = (context.now, longest_lease(context.settings()));
         let relays = context.mission().relays();
-        if requests.in_place && self.orders.in_place {
+        // The last orders may state that all are in place only because the time limit had passed.
+        if core::mem::replace(&mut known.reported, requests.in_place) && requests.in_place {
             known.settled_at = now;
         }
-        let in_place = requests.in_place || now.since(known.settled_at).times(2) >= most;
+        let moving = now.since(known.settled_at + respacing(context.settings()));
+        let in_place = requests.in_place || moving.times(2) >= most;
         let mut orders = Orders {
             in_place,
             ..Orders::NONE
@@ -292,6 +302,7 @@ impl Lease {
         self.requests = None;
         if let Some(departures) = self.departures.first_mut() {
             departures.turned_at = None;
+            departures.reported = false;
         }
     }
 
@@ -543,10 +554,18 @@ impl Lease {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
     use super::{Current, Lease};
+    use crate::mission::Mission;
+    use crate::mission::tests::paper;
+    use crate::node::context::{Context, Member, OtherLeases};
     use crate::settings::Settings;
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
+    use crate::wire::message::Requests;
 
     /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
     /// change the leader is in view 1, and its lease renewal has been outstanding for 40 s. The new view, number `base`
@@ -574,5 +593,59 @@ mod tests {
     #[test]
     fn an_unfinished_pulse_of_a_relay_left_out_does_not_count() {
         assert_eq!(span_after(2), 150);
+    }
+
+    /// Returns the times, s, at which the leader's orders state that some relay is not in place. The leader agrees at 0 s,
+    /// and every 5 s, until 300 s, gives orders after a renewal that reports `is_in_place(time)`.
+    #[cfg(feature = "departures")]
+    fn not_in_place(respacing_s: u64, is_in_place: impl Fn(u64) -> bool) -> Vec<u64> {
+        let settings = Settings {
+            respacing: Duration::from_millis(1_000 * respacing_s),
+            ..Settings::default()
+        };
+        let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
+        let mut lease = Lease::new(1, Instant::ZERO, &settings);
+        lease.on_agreement(Instant::ZERO, true);
+        let mut gives = |at_s: u64| {
+            let context = Context {
+                now: Instant::from_millis(1_000 * at_s),
+                member: &member,
+                latest: member.active,
+                end: false,
+                other_leases: OtherLeases::NONE,
+            };
+            lease.requests = Some(Requests {
+                in_place: is_in_place(at_s),
+                ..Requests::NONE
+            });
+            lease.orders = lease.next_orders(&context);
+            lease.orders.in_place
+        };
+        let all = (5..=300).step_by(5);
+        all.filter(|at_s| !gives(*at_s)).collect()
+    }
+
+    /// Checks that relays that move after a later agreement of a view are not in place, as after the first agreement.
+    ///
+    /// A single report after the time limit proves nothing: it does not restart the limit.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn relays_in_place_are_asked_again_after_later_agreements() {
+        let from_to = |from: u64, to: u64| (from..=to).step_by(5).collect::<Vec<_>>();
+        let moved = from_to(105, 155);
+        assert_eq!(not_in_place(0, |at_s| at_s <= 100), moved);
+        assert_eq!(not_in_place(0, |at_s| at_s <= 100 || at_s == 200), moved);
+        let twice = not_in_place(0, |at_s| at_s <= 100 || [200, 205].contains(&at_s));
+        assert_eq!(twice, [moved, from_to(210, 260)].concat());
+    }
+
+    /// Checks that the slowest permitted motion ends before its relays count as in place.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn relays_on_a_slow_motion_are_not_in_place() {
+        let settings = Settings::default();
+        let respacing_s = settings.dead_after.times(4).as_micros() / 1_000_000;
+        let all = not_in_place(respacing_s, |at_s| at_s > respacing_s + 30);
+        assert_eq!(all.last(), Some(&(respacing_s + 30)));
     }
 }

@@ -12,7 +12,7 @@ mod released;
 
 const APART: f32 = 10.0;
 
-fn config() -> GuardConfig {
+pub(crate) fn config() -> GuardConfig {
     GuardConfig {
         geofence: Geofence {
             least_x_m: 0.0,

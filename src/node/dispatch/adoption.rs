@@ -3,12 +3,11 @@
 //! The setpoint depends on the drone's reports, which are handled here, too.
 
 use super::Node;
-use super::departure::Leaving;
 use crate::event::Event;
 use crate::features::UPLOAD;
 use crate::guard::HoldReason;
 use crate::mission::Mission;
-use crate::node::context::{Member, ProposalOutcome};
+use crate::node::context::{Member, ProposalOutcome, respacing};
 use crate::node::steering::Begin;
 use crate::place::Placement;
 use crate::settings::Method;
@@ -139,7 +138,7 @@ impl Node {
         let span = if self.layers.view.has_no_quorum() {
             Duration::from_micros(0)
         } else {
-            Leaving::respacing(&self.member.settings)
+            respacing(&self.member.settings)
         };
         // The order comes first: a relay that also requests to leave closes up to the relay that leaves now.
         let leaver = match self.layers.lease.orders().leaver {
