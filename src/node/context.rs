@@ -303,8 +303,11 @@ pub(crate) enum ProposalOutcome {
     /// Its positions may be used after `usable_in` tenths of a second, when older leases have ended.
     Granted { relays: u16, usable_in: u16 },
     /// An earlier decision on a different view is accepted instead. The leader then proposes a successor of the
-    /// accepted view.
-    Superseded,
+    /// accepted view. `view` is that view if this relay was polled in it; `usable_in` is as in `Granted`.
+    Superseded {
+        view: Option<ViewId>,
+        usable_in: u16,
+    },
     /// Rejected: too few relays are reachable for a quorum.
     NoQuorum,
 }

@@ -38,6 +38,12 @@
 //! votes for a view without r states when the last lease that it vouched for expires: span after its own last report, which is
 //! never before r's expiry.
 //!
+//! A proposal may end with a view B that was decided before, on an earlier proposal, and that only some members have accepted. B
+//! follows A. A relay that was polled in B and flies by A then knows a bound of all leases before B: the larger of two times. The
+//! first is the end of the leases that it vouched for in A; a renewal of A that it completes later extends this time. The second
+//! is the waiting time of the decision, which bounds the leases before A. No relay has a lease of B, because a renewal of B needs
+//! all relays that were polled in B, and this one has completed none: it would know that B is agreed on, and reject the decision.
+//!
 //! # Timing
 //! The span is three round trips plus two periods, at least `dead_after` and at most eight times `dead_after`: on a lossy channel
 //! a silence is weaker evidence. The renewal period is the larger of half of `probe_after` and two round trips; the latter count
@@ -73,13 +79,7 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Latest possible end of other members' leases that this relay's completed renewals have extended. Each lease
-    /// renewal that this relay completes extends the leases of all members.
-    vouched_until: Instant,
-    /// Last accepted view, and the earliest time at which its agreed positions may be used.
-    accepted: (ViewId, Instant),
-    /// Latest time at which a lease from before the accepted view can end; `None` if unknown.
-    older_leases_end: Option<Instant>,
+    bounds: LeaseBounds,
     /// True once this relay knows that all members have accepted the view. Every completed lease renewal proves this,
     /// because every member takes part in the renewal.
     is_whole: bool,
@@ -119,6 +119,69 @@ struct Departures {
     turned_at: Option<Instant>,
 }
 
+/// Bounds of the ends of other relays' leases, as far as this relay knows them.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct LeaseBounds {
+    /// Latest possible end of other members' leases that this relay's completed renewals have extended. Each lease
+    /// renewal that this relay completes extends the leases of all members.
+    vouched_until: Instant,
+    /// Last accepted view, and the earliest time at which its agreed positions may be used. This relay is a member of
+    /// the view, but does not necessarily fly by it.
+    accepted: (ViewId, Instant),
+    /// Latest time at which a lease from before the accepted view can end; `None` if unknown.
+    older_leases_end: Option<Instant>,
+}
+
+impl LeaseBounds {
+    pub(crate) fn new(now: Instant, settings: &Settings) -> Self {
+        Self {
+            vouched_until: now + settings.dead_after,
+            accepted: (ViewId::LOADED, now),
+            older_leases_end: Some(now),
+        }
+    }
+
+    /// Records that this relay, a member of `view`, has accepted it. It follows the view `base`, and its positions must
+    /// not be used before the time `rest`.
+    ///
+    /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
+    /// that lease ends by `vouched_until`, because no renewal completes without all members.
+    pub(crate) fn accept(&mut self, (view, base): (ViewId, ViewId), rest: Instant) {
+        if view == self.accepted.0 {
+            return;
+        }
+        let known = self.older_leases_end.filter(|_| self.accepted.0 == base);
+        self.older_leases_end = known.map(|until| until.max(rest).max(self.vouched_until));
+        self.accepted = (view, rest);
+    }
+
+    /// Records that all members have accepted `view`. Leases of earlier views end before its positions may be used.
+    /// No effect if this relay has accepted another view since.
+    pub(crate) fn confirm(&mut self, view: ViewId) {
+        if view == self.accepted.0 {
+            self.older_leases_end = Some(self.accepted.1);
+        }
+    }
+
+    /// Records that this relay has completed a renewal of `view`. Until `until` other members may rely on it.
+    pub(crate) fn vouch(&mut self, view: ViewId, until: Instant) {
+        self.vouched_until = self.vouched_until.max(until);
+        if view != self.accepted.0 {
+            // This relay has accepted a view that was decided before, and still flies by an earlier one.
+            self.older_leases_end = self.older_leases_end.map(|end| end.max(until));
+        }
+    }
+
+    /// Returns the remaining leases of other members, as far as this relay knows.
+    pub(crate) fn other_leases(&self, now: Instant) -> OtherLeases {
+        OtherLeases {
+            lease_left: self.vouched_until.since(now),
+            view: self.accepted.0,
+            earlier_lease_left: self.older_leases_end.map(|until| until.since(now)),
+        }
+    }
+}
+
 const fn from_tenths(tenths: u16) -> Duration {
     Duration::from_millis(100 * tenths as u64)
 }
@@ -130,9 +193,7 @@ impl Lease {
         Self {
             state: LeaseState::Pending,
             current: None,
-            vouched_until: now + settings.dead_after,
-            accepted: (ViewId::LOADED, now),
-            older_leases_end: Some(now),
+            bounds: LeaseBounds::new(now, settings),
             is_whole: false,
             is_agreed: false,
             next_at: None,
@@ -227,7 +288,7 @@ impl Lease {
     /// Extends `vouched_until` by the maximum duration of a lease, after a restart of this relay. Other members may
     /// still have leases that they got before the restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {
-        self.vouched_until = self.vouched_until + longest_lease(settings);
+        self.bounds.vouched_until = self.bounds.vouched_until + longest_lease(settings);
     }
 
     /// Returns the time at which this relay's lease expires; `None` if it has no lease.
@@ -258,17 +319,16 @@ impl Lease {
 
     /// Returns the remaining leases of other members, as far as this relay knows.
     pub(crate) fn other_leases(&self, now: Instant) -> OtherLeases {
-        OtherLeases {
-            lease_left: self.vouched_until.since(now),
-            view: self.accepted.0,
-            earlier_lease_left: self.older_leases_end.map(|until| until.since(now)),
-        }
+        self.bounds.other_leases(now)
+    }
+
+    /// Records that this relay has accepted a view that was decided before, see [`LeaseBounds::accept`]. The relay does
+    /// not fly by this view, so its own lease and its agreement continue until the next one.
+    pub(crate) fn accept_decided(&mut self, views: (ViewId, ViewId), rest: Instant) {
+        self.bounds.accept(views, rest);
     }
 
     /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before the time `rest`.
-    ///
-    /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
-    /// that lease ends by `vouched_until`, because no renewal completes without all members.
     ///
     /// The age of an outstanding renewal counts as a round trip only if this relay was a member of `base` and `lost` is
     /// false. If a relay is lost (`lost` is true), the age is the duration of the outage.
@@ -281,12 +341,12 @@ impl Lease {
     ) {
         let is_under_way = self.circulation.is_outstanding();
         let started_at = self.circulation.started_at();
-        if let Some(at) = started_at.filter(|_| is_under_way && !lost && self.accepted.0 == base) {
+        if let Some(at) =
+            started_at.filter(|_| is_under_way && !lost && self.bounds.accepted.0 == base)
+        {
             self.round_trip = self.round_trip.max(now.since(at));
         }
-        let known = self.older_leases_end.filter(|_| self.accepted.0 == base);
-        self.older_leases_end = known.map(|until| until.max(rest).max(self.vouched_until));
-        self.accepted = (view, rest);
+        self.bounds.accept((view, base), rest);
         self.end();
     }
 
@@ -314,12 +374,11 @@ impl Lease {
         self.departures.first()?.turned_at
     }
 
-    /// Records that all members have accepted this relay's view. Leases of earlier views end before the positions of
-    /// this view may be used.
-    pub(crate) fn confirm_view(&mut self) {
-        self.older_leases_end = Some(self.accepted.1);
+    /// Records that all members have accepted this relay's view `view`.
+    pub(crate) fn confirm_view(&mut self, view: ViewId) {
+        self.bounds.confirm(view);
         // The initial view is configured and needs no acceptance.
-        self.is_whole |= self.accepted.0 != ViewId::LOADED;
+        self.is_whole |= view != ViewId::LOADED;
     }
 
     /// Returns true once all relays of the view are known to have accepted it.
@@ -430,9 +489,8 @@ impl Lease {
             let half = Duration::from_micros(context.now.since(forwarded_at).as_micros() / 2);
             departures.turned_at.get_or_insert(forwarded_at + half);
         }
-        self.vouched_until = self
-            .vouched_until
-            .max(context.now + from_tenths(current.span));
+        let until = context.now + from_tenths(current.span);
+        self.bounds.vouch(context.member.view, until);
         self.circulation
             .complete(context.now, context.path_to_leader());
         if !context.leads() {
@@ -574,7 +632,7 @@ mod tests {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);
         let mut lease = Lease::new(1, Instant::ZERO, &settings);
-        lease.accepted = (view(1), Instant::ZERO);
+        lease.bounds.accepted = (view(1), Instant::ZERO);
         lease.current = Some(Current {
             number: 7,
             span: 150,

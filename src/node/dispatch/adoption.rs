@@ -32,7 +32,12 @@ impl Node {
         let leads = place == 1;
         let (relays, usable_in) = match decided {
             ProposalOutcome::Granted { relays, usable_in } => (relays, usable_in),
-            ProposalOutcome::Superseded => {
+            ProposalOutcome::Superseded { view, usable_in } => {
+                if let Some(view) = view {
+                    let rest = now + Duration::from_millis(100).times(u32::from(usable_in));
+                    let views = (view, proposed.base.id);
+                    self.layers.lease.accept_decided(views, rest);
+                }
                 if leads {
                     self.layers.view.request.start(now);
                 }
@@ -68,7 +73,7 @@ impl Node {
             .lease
             .accept_view(now, views, rest, relays < before);
         if leads {
-            self.layers.lease.confirm_view();
+            self.layers.lease.confirm_view(proposed.view);
         }
         self.layers.round.renew(rest, leads, works);
         self.layers.leaving.end_order();
