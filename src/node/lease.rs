@@ -683,7 +683,7 @@ mod tests {
         all.filter(|at_s| !gives(*at_s)).collect()
     }
 
-    /// Checks that relays that move after a later agreement of a view are not in place, as after the first agreement.
+    /// Checks that relays that move after a later agreement of a view are not in place.
     ///
     /// A single report after the time limit proves nothing: it does not restart the limit.
     #[cfg(feature = "departures")]

@@ -354,7 +354,7 @@ fn a_late_fence_links_no_relay_on_the_wrong_side() {
     assert!(last.guard.has_lost(Side::Upstream));
 }
 
-/// Checks that a late message with an earlier fence does not bring back its sender's earlier agreed position.
+/// Checks that a late message with an earlier fence does not change the sender's agreed position.
 #[test]
 fn a_late_fence_does_not_restore_an_earlier_position() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -371,7 +371,9 @@ fn a_late_fence_does_not_restore_an_earlier_position() {
     assert_eq!(place(&pair), Some(at(20.0)));
 }
 
-/// Checks rule 9 for a relay whose number is beyond that of a lost drone toward Rx: its x has to be beyond it, too.
+/// Checks rule 9 for a relay with a number beyond that of a lost drone toward Rx.
+///
+/// Its x has to be beyond that of the drone, too.
 #[test]
 fn a_relay_before_a_lost_drone_with_a_lower_number_does_not_join() {
     for (x_m, joins) in [(250.0, false), (350.0, true)] {

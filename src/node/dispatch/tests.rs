@@ -472,7 +472,7 @@ fn a_relay_outside_proposes_nothing() {
     assert_eq!(node.departure(NOW), crate::Departure::Member);
 }
 
-/// Checks that a motion without a common start time waits 15 s, and in addition the lead of the common start.
+/// Checks that a motion without a common start time waits 15 s and the lead of the common start.
 ///
 /// In chains of more than 125 relays the lead is longer than 15 s. A relay that begins alone must not be too early.
 #[cfg(feature = "departures")]
@@ -496,7 +496,7 @@ fn a_motion_waits_for_the_lead_of_a_long_chain() {
     assert!((half_m - 550.0).abs() < 0.1, "{half_m}");
 }
 
-/// Checks that a relay follows an order to leave that names another relay before its own request to leave.
+/// Checks that an order to leave for another relay comes before the own request to leave.
 ///
 /// It then closes up to the relay that leaves now, instead of holding its position.
 #[cfg(feature = "departures")]

@@ -677,7 +677,9 @@ impl Check {
         }
     }
 
-    /// Renews the leases of the view that the relay with list index `leader` leads, if all members can take part.
+    /// Renews the leases of the view of the relay with list index `leader`.
+    ///
+    /// No effect unless all members can take part, and the relay leads them.
     fn renew(&self, chain: &mut Chain, leader: usize) {
         let (view, _, relays) = chain.relays[leader].flies;
         let mut members = vec![leader];
