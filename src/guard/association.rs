@@ -413,15 +413,22 @@ impl KeepOut {
 
     /// Returns true if the new neighbour `node` at `x_m` is on the wrong side of a lost drone along x.
     ///
-    /// The number of `node` is between the numbers of this relay and of the lost drone. So its x has to be between the
-    /// x of these two, except for position errors. The new neighbour knows nothing of the lost drone.
+    /// If the number of `node` is between the numbers of this relay and of the lost drone, its x has to be between the
+    /// x of these two, except for position errors. The new neighbour knows nothing of the lost drone. Toward Rx, if its
+    /// number is beyond that of the lost drone, its x has to be beyond the drone's x, too. Toward Tx this is not
+    /// checked: a drone on its way may be beyond its agreed position, and its regular neighbour, too.
     pub(super) fn bars(&self, side: Side, node: u16, x_m: f32, config: &GuardConfig) -> bool {
         let beyond_m = match side {
             Side::Upstream => self.known_m - x_m,
             Side::Downstream => x_m - self.known_m,
         };
-        Self::is_nearer(side, node, self.known)
-            && beyond_m > 2.0 * config.hover_m + config.rounding()
+        let off_m = 2.0 * config.hover_m + config.rounding();
+        if Self::is_nearer(side, node, self.known) {
+            beyond_m > off_m
+        } else {
+            // Relays in order may be reported in the wrong order by twice the error.
+            side == Side::Downstream && node != self.known && beyond_m < -2.0 * off_m
+        }
     }
 
     /// Removes obstacles on `side` after a message from `node`: the node itself, and all nodes beyond it. These are no

@@ -56,15 +56,21 @@ impl FenceFollower {
         if self.is_out_of_order(own) {
             self.keep_out.mark_disordered();
         }
-        let before = self.association.node;
-        if node < before && !self.association.has_no_flown_neighbour() && self.has_fence() {
-            // Its fence and its agreed position are known, but not where it is on its way.
-            let most_m = self.fence_m - self.requested_m.min(own.config.separation_m);
-            let x_m = most_m.min(self.target_m);
-            self.keep_out.record_lost_x(Side::Upstream, before, x_m);
+        if node < self.association.node {
+            self.record_lost_x(own);
         }
         self.renew(own, jitter);
         self.association.node = node;
+    }
+
+    /// Records the x of the upstream neighbour, which is lost or has restarted. Its fence and its agreed position are
+    /// known, but not where it is on its way.
+    fn record_lost_x(&mut self, own: &Own) {
+        if !self.association.has_no_flown_neighbour() && self.has_fence() {
+            let most_m = self.fence_m - self.requested_m.min(own.config.separation_m);
+            let (node, x_m) = (self.association.node, most_m.min(self.target_m));
+            self.keep_out.record_lost_x(Side::Upstream, node, x_m);
+        }
     }
 
     /// Starts a new association (session) with the upstream neighbour. The field `keep_out` keeps the lower limit of
@@ -145,27 +151,36 @@ impl FenceFollower {
             return;
         }
         self.keep_out.remove_unflown();
-        if self.association.peer_number == 0 {
+        let is_first = self.association.peer_number == 0;
+        // A fence with a number does not have its sender's x, and is of an association that this relay has left.
+        if fence.association != self.association.peer_number
+            && (is_first || self.association.count_foreign())
+            && fence.number == 0
+        {
             let node = self.association.node;
             let keep_out = &self.keep_out;
-            if fence.number == 0 && keep_out.bars(Side::Upstream, node, fence.x_m, &own.config) {
+            if keep_out.bars(Side::Upstream, node, fence.x_m, &own.config) {
                 return;
             }
+            if !is_first {
+                self.record_lost_x(own);
+                self.renew(own, jitter);
+            }
             self.association.pair(fence.association);
-        } else if fence.association != self.association.peer_number
-            && self.association.count_foreign()
-        {
-            self.renew(own, jitter);
-            self.association.peer_number = fence.association;
         }
         // Always reply: a message is repeated if its reply was lost.
         self.association.due = true;
         if !self.association.is_current(fence.association, fence.echo) {
             return;
         }
+        let is_other = fence.number != self.number;
+        let is_late = is_other && !is_newer(fence.number, self.number);
+        if self.has_fence() && (fence.number == 0 || is_late) {
+            return;
+        }
         self.association.receive_open(fence);
         (self.target_m, self.across) = (fence.target_m, fence.across);
-        if fence.number != 0 && (self.number == 0 || is_newer(fence.number, self.number)) {
+        if is_other {
             if self.number == 0 {
                 self.keep_out
                     .on_fence(Side::Upstream, self.association.node);

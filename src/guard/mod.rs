@@ -35,7 +35,7 @@
 //! | 6 | As far as rule 5 allows, the fence is halfway between the two agreed positions plus half the step. Beside a relay with the order to leave, which holds its position, it is next to that relay. | both can reach their positions, and the neighbours close up to one that leaves |
 //! | 7 | The first fence is the separation beyond the owner's own interval. Other fences, and moves across the line, start when the follower has cleared it. Until a relay has cleared the first fence upstream, it keeps room for the owner of that fence: each fence that it sends downstream is at least the separation beyond the highest x that the owner may still take. | a start that is too close is opened first, and no relay descends onto another |
 //! | 8 | The first setpoint is the last reported position, with side and altitude, even outside of the geofence. Its x counts once a report shows the effect of the setpoint, or at once if the drone hovered there for the lag before. The setpoint remains until both neighbours are known to be in order: the follower has reported that it is beyond the owner, the owner has announced a fence. A relay sends a position that counts to one neighbour only while it is in order with the other one. | nothing is granted before the order is known, after a start, a reboot or a new link |
-//! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If it was never heard, this relay goes no farther toward it. A new neighbour with a number between the two is linked only once its x is between them, too. | no relay flies into a silent one that still hovers |
+//! | 9 | No limit expires with time: the last limit of a neighbour that is replaced or restarts remains until that neighbour sends again, or [`Guard::forget`]. If it was never heard, this relay goes no farther toward it. A new neighbour with a number between the two is linked only once its x is between them, too; toward Rx, one with a number beyond the silent one only once its x is beyond it. | no relay flies into a silent one that still hovers |
 //! | 10 | With a fence the owner sends the step that it requests. From a step below the separation until the next one that equals it, neither moves across the line: the owner from its request on, the follower from its reception on. | the follower's reported position across the line remains valid |
 //! | 11 | The step is the separation. It becomes smaller when the follower has reported, together with the newest fence, that and where it has arrived across the line, and that it agrees. Then it is the largest of the requested step, of the distance along x that the two positions across the line still require, and of the step by rule 12. The owner announces a larger one only once it is that far before the x it relies on. | the two are the separation apart in space |
 //! | 12 | The steps upstream and downstream of a relay add up to at least the separation: it agrees to a smaller step upstream, and takes one downstream, only as far as the sum allows. | relays that are not neighbours are the separation apart along x |
@@ -94,7 +94,7 @@ mod follower;
 mod own;
 mod owner;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use crate::place::Placement;
 use crate::side::Side;
@@ -248,6 +248,11 @@ impl Guard {
     /// that relay then move as near to it as its position permits, so that its neighbours can close up to it.
     pub const fn set_leaver(&mut self, node: u16) {
         self.own.leaver = node;
+    }
+
+    #[cfg(all(test, feature = "departures"))]
+    pub(crate) const fn leaver(&self) -> u16 {
+        self.own.leaver
     }
 
     /// Handles a message about a fence (limit of x) from node `from`, a neighbour at `side`.

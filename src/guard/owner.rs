@@ -63,17 +63,21 @@ impl FenceOwner {
         if self.is_out_of_order(own) {
             self.keep_out.mark_disordered();
         }
-        let before = self.association.node;
-        let is_lost = node == 0 || node > before;
-        if is_lost && !self.association.has_no_flown_neighbour() && self.follower_low_m.is_finite()
-        {
-            // Its last known x, or on its way to its agreed position, but not before the last fence that it has passed.
-            let last_m = self.association.last_m().min(self.target_m);
-            let x_m = last_m.max(self.follower_low_m);
-            self.keep_out.record_lost_x(Side::Downstream, before, x_m);
+        if node == 0 || node > self.association.node {
+            self.record_lost_x();
         }
         self.renew(own, jitter);
         self.association.node = node;
+    }
+
+    /// Records the x of the downstream neighbour, which is lost or has restarted. It is its last known x, or on its way
+    /// to its agreed position, but not before the last fence that it has passed.
+    fn record_lost_x(&mut self) {
+        if !self.association.has_no_flown_neighbour() && self.follower_low_m.is_finite() {
+            let last_m = self.association.last_m().min(self.target_m);
+            let (node, x_m) = (self.association.node, last_m.max(self.follower_low_m));
+            self.keep_out.record_lost_x(Side::Downstream, node, x_m);
+        }
     }
 
     /// Starts a new association (session) with the downstream neighbour. The field `keep_out` keeps the upper limit of
@@ -251,6 +255,7 @@ impl FenceOwner {
         }
         if !self.association.is_current(fence.association, fence.echo) {
             if self.has_reply() && self.association.count_foreign() {
+                self.record_lost_x();
                 self.renew(own, jitter);
             }
             self.association.due |= self.association.is_absent();

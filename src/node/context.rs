@@ -307,8 +307,11 @@ pub(crate) enum ProposalOutcome {
     /// Its positions may be used after `usable_in` tenths of a second, when older leases have ended.
     Granted { relays: u16, usable_in: u16 },
     /// An earlier decision on a different view is accepted instead. The leader then proposes a successor of the
-    /// accepted view.
-    Superseded,
+    /// accepted view. `view` is that view if this relay was polled in it; `usable_in` is as in `Granted`.
+    Superseded {
+        view: Option<ViewId>,
+        usable_in: u16,
+    },
     /// Rejected: too few relays are reachable for a quorum.
     NoQuorum,
 }
@@ -377,6 +380,14 @@ const MAX_LEASE: u32 = 8;
 
 pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
+}
+
+/// Returns the duration of the motion to a newly agreed position.
+pub(crate) const fn respacing(settings: &Settings) -> Duration {
+    #[cfg(feature = "departures")]
+    return settings.respacing;
+    #[cfg(not(feature = "departures"))]
+    return settings.dead_after.times(0);
 }
 
 /// Returns the maximum time from the leader's first message along the chain until its result returns.

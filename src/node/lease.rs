@@ -38,6 +38,12 @@
 //! votes for a view without r states when the last lease that it vouched for expires: span after its own last report, which is
 //! never before r's expiry.
 //!
+//! A proposal may end with a view B that was decided before, on an earlier proposal, and that only some members have accepted. B
+//! follows A. A relay that was polled in B and flies by A then knows a bound of all leases before B: the larger of two times. The
+//! first is the end of the leases that it vouched for in A; a renewal of A that it completes later extends this time. The second
+//! is the waiting time of the decision, which bounds the leases before A. No relay has a lease of B, because a renewal of B needs
+//! all relays that were polled in B, and this one has completed none: it would know that B is agreed on, and reject the decision.
+//!
 //! # Timing
 //! The span is three round trips plus two periods, at least `dead_after` and at most eight times `dead_after`: on a lossy channel
 //! a silence is weaker evidence. The renewal period is the larger of half of `probe_after` and two round trips; the latter count
@@ -46,7 +52,7 @@
 use super::circulation::{Circulation, Reply};
 use super::context::OtherLeases;
 use super::context::{Context, Effects, LayerEvent, Peer};
-use super::context::{PAUSE, earliest, longest_lease, tenths};
+use super::context::{PAUSE, earliest, longest_lease, respacing, tenths};
 use crate::features::DEPARTURES;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -73,13 +79,7 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Latest possible end of other members' leases that this relay's completed renewals have extended. Each lease
-    /// renewal that this relay completes extends the leases of all members.
-    vouched_until: Instant,
-    /// Last accepted view, and the earliest time at which its agreed positions may be used.
-    accepted: (ViewId, Instant),
-    /// Latest time at which a lease from before the accepted view can end; `None` if unknown.
-    older_leases_end: Option<Instant>,
+    bounds: LeaseBounds,
     /// True once this relay knows that all members have accepted the view. Every completed lease renewal proves this,
     /// because every member takes part in the renewal.
     is_whole: bool,
@@ -112,9 +112,74 @@ struct Departures {
     ///
     /// All are in place if two renewals in a row report it. The time is that of the leader.
     settled_at: Instant,
+    /// True if the last renewal has reported that all relays of the view are in place.
+    reported: bool,
     /// Time at which the last relay answered this view's first lease renewal, as estimated by this relay. `None` until
     /// this renewal has completed.
     turned_at: Option<Instant>,
+}
+
+/// Bounds of the ends of other relays' leases, as far as this relay knows them.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct LeaseBounds {
+    /// Latest possible end of other members' leases that this relay's completed renewals have extended. Each lease
+    /// renewal that this relay completes extends the leases of all members.
+    vouched_until: Instant,
+    /// Last accepted view, and the earliest time at which its agreed positions may be used. This relay is a member of
+    /// the view, but does not necessarily fly by it.
+    accepted: (ViewId, Instant),
+    /// Latest time at which a lease from before the accepted view can end; `None` if unknown.
+    older_leases_end: Option<Instant>,
+}
+
+impl LeaseBounds {
+    pub(crate) fn new(now: Instant, settings: &Settings) -> Self {
+        Self {
+            vouched_until: now + settings.dead_after,
+            accepted: (ViewId::LOADED, now),
+            older_leases_end: Some(now),
+        }
+    }
+
+    /// Records that this relay, a member of `view`, has accepted it. It follows the view `base`, and its positions must
+    /// not be used before the time `rest`.
+    ///
+    /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
+    /// that lease ends by `vouched_until`, because no renewal completes without all members.
+    pub(crate) fn accept(&mut self, (view, base): (ViewId, ViewId), rest: Instant) {
+        if view == self.accepted.0 {
+            return;
+        }
+        let known = self.older_leases_end.filter(|_| self.accepted.0 == base);
+        self.older_leases_end = known.map(|until| until.max(rest).max(self.vouched_until));
+        self.accepted = (view, rest);
+    }
+
+    /// Records that all members have accepted `view`. Leases of earlier views end before its positions may be used.
+    /// No effect if this relay has accepted another view since.
+    pub(crate) fn confirm(&mut self, view: ViewId) {
+        if view == self.accepted.0 {
+            self.older_leases_end = Some(self.accepted.1);
+        }
+    }
+
+    /// Records that this relay has completed a renewal of `view`. Until `until` other members may rely on it.
+    pub(crate) fn vouch(&mut self, view: ViewId, until: Instant) {
+        self.vouched_until = self.vouched_until.max(until);
+        if view != self.accepted.0 {
+            // This relay has accepted a view that was decided before, and still flies by an earlier one.
+            self.older_leases_end = self.older_leases_end.map(|end| end.max(until));
+        }
+    }
+
+    /// Returns the remaining leases of other members, as far as this relay knows.
+    pub(crate) fn other_leases(&self, now: Instant) -> OtherLeases {
+        OtherLeases {
+            lease_left: self.vouched_until.since(now),
+            view: self.accepted.0,
+            earlier_lease_left: self.older_leases_end.map(|until| until.since(now)),
+        }
+    }
 }
 
 const fn from_tenths(tenths: u16) -> Duration {
@@ -128,9 +193,7 @@ impl Lease {
         Self {
             state: LeaseState::Pending,
             current: None,
-            vouched_until: now + settings.dead_after,
-            accepted: (ViewId::LOADED, now),
-            older_leases_end: Some(now),
+            bounds: LeaseBounds::new(now, settings),
             is_whole: false,
             is_agreed: false,
             next_at: None,
@@ -143,6 +206,7 @@ impl Lease {
                 complement: 0,
                 leaver: (0, now),
                 settled_at: now,
+                reported: false,
                 turned_at: None,
             }; DEPARTURES as usize],
         }
@@ -160,6 +224,11 @@ impl Lease {
         self.orders
     }
 
+    #[cfg(all(test, feature = "departures"))]
+    pub(crate) const fn set_orders(&mut self, orders: Orders) {
+        self.orders = orders;
+    }
+
     /// Returns true if all relays of the view have provably received the leader's last orders.
     pub(crate) fn has_completed(&self) -> bool {
         self.current.is_some() && !self.circulation.is_outstanding()
@@ -171,8 +240,8 @@ impl Lease {
     /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
     /// it joins first, unless the view already has more relays than before the request to leave.
     ///
-    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease, counted from the
-    /// first agreement in this view, or from the last time that all were in place. A relay waits for its order to leave
+    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration of
+    /// a motion, counted from the first agreement in this view, or from the last time that all were in place. A relay waits for its order to leave
     /// at most this maximum duration, and at most its remaining endurance. So at least half of the endurance at the
     /// first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
@@ -181,10 +250,12 @@ impl Lease {
         };
         let (now, most) = (context.now, longest_lease(context.settings()));
         let relays = context.mission().relays();
-        if requests.in_place && self.orders.in_place {
+        // The last orders may state that all are in place only because the time limit had passed.
+        if core::mem::replace(&mut known.reported, requests.in_place) && requests.in_place {
             known.settled_at = now;
         }
-        let in_place = requests.in_place || now.since(known.settled_at).times(2) >= most;
+        let moving = now.since(known.settled_at + respacing(context.settings()));
+        let in_place = requests.in_place || moving.times(2) >= most;
         let mut orders = Orders {
             in_place,
             ..Orders::NONE
@@ -217,7 +288,7 @@ impl Lease {
     /// Extends `vouched_until` by the maximum duration of a lease, after a restart of this relay. Other members may
     /// still have leases that they got before the restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {
-        self.vouched_until = self.vouched_until + longest_lease(settings);
+        self.bounds.vouched_until = self.bounds.vouched_until + longest_lease(settings);
     }
 
     /// Returns the time at which this relay's lease expires; `None` if it has no lease.
@@ -248,17 +319,16 @@ impl Lease {
 
     /// Returns the remaining leases of other members, as far as this relay knows.
     pub(crate) fn other_leases(&self, now: Instant) -> OtherLeases {
-        OtherLeases {
-            lease_left: self.vouched_until.since(now),
-            view: self.accepted.0,
-            earlier_lease_left: self.older_leases_end.map(|until| until.since(now)),
-        }
+        self.bounds.other_leases(now)
+    }
+
+    /// Records that this relay has accepted a view that was decided before, see [`LeaseBounds::accept`]. The relay does
+    /// not fly by this view, so its own lease and its agreement continue until the next one.
+    pub(crate) fn accept_decided(&mut self, views: (ViewId, ViewId), rest: Instant) {
+        self.bounds.accept(views, rest);
     }
 
     /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before the time `rest`.
-    ///
-    /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
-    /// that lease ends by `vouched_until`, because no renewal completes without all members.
     ///
     /// The age of an outstanding renewal counts as a round trip only if this relay was a member of `base` and `lost` is
     /// false. If a relay is lost (`lost` is true), the age is the duration of the outage.
@@ -271,12 +341,12 @@ impl Lease {
     ) {
         let is_under_way = self.circulation.is_outstanding();
         let started_at = self.circulation.started_at();
-        if let Some(at) = started_at.filter(|_| is_under_way && !lost && self.accepted.0 == base) {
+        if let Some(at) =
+            started_at.filter(|_| is_under_way && !lost && self.bounds.accepted.0 == base)
+        {
             self.round_trip = self.round_trip.max(now.since(at));
         }
-        let known = self.older_leases_end.filter(|_| self.accepted.0 == base);
-        self.older_leases_end = known.map(|until| until.max(rest).max(self.vouched_until));
-        self.accepted = (view, rest);
+        self.bounds.accept((view, base), rest);
         self.end();
     }
 
@@ -292,6 +362,7 @@ impl Lease {
         self.requests = None;
         if let Some(departures) = self.departures.first_mut() {
             departures.turned_at = None;
+            departures.reported = false;
         }
     }
 
@@ -303,12 +374,11 @@ impl Lease {
         self.departures.first()?.turned_at
     }
 
-    /// Records that all members have accepted this relay's view. Leases of earlier views end before the positions of
-    /// this view may be used.
-    pub(crate) fn confirm_view(&mut self) {
-        self.older_leases_end = Some(self.accepted.1);
+    /// Records that all members have accepted this relay's view `view`.
+    pub(crate) fn confirm_view(&mut self, view: ViewId) {
+        self.bounds.confirm(view);
         // The initial view is configured and needs no acceptance.
-        self.is_whole |= self.accepted.0 != ViewId::LOADED;
+        self.is_whole |= view != ViewId::LOADED;
     }
 
     /// Returns true once all relays of the view are known to have accepted it.
@@ -419,9 +489,8 @@ impl Lease {
             let half = Duration::from_micros(context.now.since(forwarded_at).as_micros() / 2);
             departures.turned_at.get_or_insert(forwarded_at + half);
         }
-        self.vouched_until = self
-            .vouched_until
-            .max(context.now + from_tenths(current.span));
+        let until = context.now + from_tenths(current.span);
+        self.bounds.vouch(context.member.view, until);
         self.circulation
             .complete(context.now, context.path_to_leader());
         if !context.leads_view() {
@@ -543,10 +612,18 @@ impl Lease {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
     use super::{Current, Lease};
+    use crate::mission::Mission;
+    use crate::mission::tests::paper;
+    use crate::node::context::{Context, Member, OtherLeases};
     use crate::settings::Settings;
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
+    use crate::wire::message::Requests;
 
     /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
     /// change the leader is in view 1, and its lease renewal has been outstanding for 40 s. The new view, number `base`
@@ -555,7 +632,7 @@ mod tests {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);
         let mut lease = Lease::new(1, Instant::ZERO, &settings);
-        lease.accepted = (view(1), Instant::ZERO);
+        lease.bounds.accepted = (view(1), Instant::ZERO);
         lease.current = Some(Current {
             number: 7,
             span: 150,
@@ -574,5 +651,59 @@ mod tests {
     #[test]
     fn an_unfinished_pulse_of_a_relay_left_out_does_not_count() {
         assert_eq!(span_after(2), 150);
+    }
+
+    /// Returns the times, s, at which the leader's orders state that some relay is not in place. The leader agrees at 0 s,
+    /// and every 5 s, until 300 s, gives orders after a renewal that reports `is_in_place(time)`.
+    #[cfg(feature = "departures")]
+    fn not_in_place(respacing_s: u64, is_in_place: impl Fn(u64) -> bool) -> Vec<u64> {
+        let settings = Settings {
+            respacing: Duration::from_millis(1_000 * respacing_s),
+            ..Settings::default()
+        };
+        let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
+        let mut lease = Lease::new(1, Instant::ZERO, &settings);
+        lease.on_agreement(Instant::ZERO, true);
+        let mut gives = |at_s: u64| {
+            let context = Context {
+                now: Instant::from_millis(1_000 * at_s),
+                member: &member,
+                latest: member.active,
+                is_last_reachable: false,
+                other_leases: OtherLeases::NONE,
+            };
+            lease.requests = Some(Requests {
+                in_place: is_in_place(at_s),
+                ..Requests::NONE
+            });
+            lease.orders = lease.next_orders(&context);
+            lease.orders.in_place
+        };
+        let all = (5..=300).step_by(5);
+        all.filter(|at_s| !gives(*at_s)).collect()
+    }
+
+    /// Checks that relays that move after a later agreement of a view are not in place.
+    ///
+    /// A single report after the time limit proves nothing: it does not restart the limit.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn relays_in_place_are_asked_again_after_later_agreements() {
+        let from_to = |from: u64, to: u64| (from..=to).step_by(5).collect::<Vec<_>>();
+        let moved = from_to(105, 155);
+        assert_eq!(not_in_place(0, |at_s| at_s <= 100), moved);
+        assert_eq!(not_in_place(0, |at_s| at_s <= 100 || at_s == 200), moved);
+        let twice = not_in_place(0, |at_s| at_s <= 100 || [200, 205].contains(&at_s));
+        assert_eq!(twice, [moved, from_to(210, 260)].concat());
+    }
+
+    /// Checks that the slowest permitted motion ends before its relays count as in place.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn relays_on_a_slow_motion_are_not_in_place() {
+        let settings = Settings::default();
+        let respacing_s = settings.dead_after.times(4).as_micros() / 1_000_000;
+        let all = not_in_place(respacing_s, |at_s| at_s > respacing_s + 30);
+        assert_eq!(all.last(), Some(&(respacing_s + 30)));
     }
 }

@@ -6,7 +6,7 @@
 use super::Relay;
 use crate::event::Event;
 use crate::node::Node;
-use crate::node::departure::Leaving;
+use crate::node::context::respacing;
 use crate::settings::Settings;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
@@ -81,7 +81,7 @@ pub(super) struct Endurance {
 impl Endurance {
     fn replacement(settings: &Settings) -> Duration {
         let usual = settings.dead_after.times(REPLACEMENT);
-        let usual = Instant::ZERO + usual + Leaving::respacing(settings);
+        let usual = Instant::ZERO + usual + respacing(settings);
         usual.since(Instant::ZERO).min(LONGEST)
     }
 

@@ -292,8 +292,7 @@ fn a_departure_ends_well_if_the_relay_stays_or_dies() {
 /// Checks that the death of a relay that leaves, or of its spare, is like any loss.
 ///
 /// The environment variable `COUNT` has the number of random moments. Two losses in a row are longer than one: the death
-/// may be found only after the next view change. If the proposal of the dying relay is decided by a spare that alone
-/// accepts it, the others wait for the longest lease.
+/// may be found only after the next view change.
 #[test]
 fn a_sudden_death_during_a_replacement_is_an_ordinary_loss() {
     let mut all_s = Vec::new();
@@ -341,15 +340,13 @@ fn a_sudden_death_during_a_replacement_is_an_ordinary_loss() {
     };
     let most_s = all_s[all_s.len() - 1];
     println!(
-        "of {} deaths {:.1} % end a lease, {:.1} % for longer than 12 s, {:.1} % for longer than 25 s, at most {most_s:.1} s",
+        "of {} deaths {:.1} % end a lease, {:.1} % for longer than 12 s, at most {most_s:.1} s",
         all_s.len(),
         100.0 * share(0.0),
         100.0 * share(12.0),
-        100.0 * share(25.0),
     );
     // As after any loss: a relay at an end searches for `lost` less `quiet`.
-    assert!(share(12.0) <= 0.04 && share(25.0) <= 0.005);
-    assert!(most_s < 8.0 * 15.0 + 12.0);
+    assert!(share(12.0) <= 0.04 && most_s <= 25.0);
 }
 
 /// Checks that a relay may leave in the end although frames are lost and damaged.

@@ -12,7 +12,7 @@ mod released;
 
 const APART: f32 = 10.0;
 
-fn config() -> GuardConfig {
+pub(crate) fn config() -> GuardConfig {
     GuardConfig {
         geofence: Geofence {
             least_x_m: 0.0,
@@ -276,6 +276,121 @@ fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
         assert_eq!(reason, (!joins).then_some(HoldReason::Lost), "{x_m}");
         last.guard.forget(Side::Upstream, false);
         assert_eq!(talk(&mut last).to_bits(), 400.0_f32.to_bits(), "{x_m}");
+    }
+}
+
+/// Checks rule 9 for a neighbour that restarts and is lost before it has joined again.
+///
+/// A relay on the wrong side of the lost drone does not join.
+#[test]
+fn a_neighbour_that_restarts_and_is_lost_is_remembered() {
+    for (x_m, joins) in [(320.0, false), (250.0, true)] {
+        let mut one = One::new([None, Some(3)], 100.0, 100.0);
+        let mut lost = One::new([Some(1), None], 300.0, 300.0);
+        for _ in 0..4 {
+            lost.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+            one.receive(Side::Downstream, 3, lost.sent(Side::Upstream));
+        }
+        for _ in 0..3 {
+            one.receive(Side::Downstream, 3, fence(9, 300.0, 300.0));
+        }
+        one.guard.set_neighbour(Side::Downstream, None);
+        let mut fresh = One::new([Some(1), None], x_m, 200.0);
+        one.guard.set_neighbour(Side::Downstream, Some(2));
+        for _ in 0..4 {
+            fresh.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+            one.receive(Side::Downstream, 2, fresh.sent(Side::Upstream));
+        }
+        let expected_m = if joins { 200.0 } else { x_m };
+        assert_eq!(fresh.setpoint().to_bits(), expected_m.to_bits(), "{x_m}");
+    }
+    for (x_m, joins) in [(280.0, false), (350.0, true)] {
+        let mut last = One::new([Some(2), None], 500.0, 500.0);
+        let mut lost = One::new([None, Some(4)], 300.0, 300.0);
+        for _ in 0..4 {
+            lost.receive(Side::Downstream, 4, last.sent(Side::Upstream));
+            last.receive(Side::Upstream, 2, lost.sent(Side::Downstream));
+        }
+        for _ in 0..3 {
+            last.receive(Side::Upstream, 2, fence(9, 300.0, 300.0));
+        }
+        last.guard.set_neighbour(Side::Upstream, None);
+        let mut fresh = One::new([None, Some(4)], x_m, 400.0);
+        last.guard.set_neighbour(Side::Upstream, Some(3));
+        for _ in 0..4 {
+            fresh.receive(Side::Downstream, 4, last.sent(Side::Upstream));
+            last.receive(Side::Upstream, 3, fresh.sent(Side::Downstream));
+        }
+        let expected_m = if joins { 400.0 } else { x_m };
+        assert_eq!(fresh.setpoint().to_bits(), expected_m.to_bits(), "{x_m}");
+    }
+}
+
+/// Checks that a late fence of an earlier association links no relay on the wrong side of a lost drone.
+///
+/// The x of a numbered fence is not that of its sender, so it proves nothing of the order.
+#[test]
+fn a_late_fence_links_no_relay_on_the_wrong_side() {
+    let mut last = One::new([Some(2), None], 500.0, 500.0);
+    let mut lost = One::new([None, Some(4)], 300.0, 300.0);
+    for _ in 0..4 {
+        lost.receive(Side::Downstream, 4, last.sent(Side::Upstream));
+        last.receive(Side::Upstream, 2, lost.sent(Side::Downstream));
+    }
+    last.guard.set_neighbour(Side::Upstream, None);
+    last.guard.set_neighbour(Side::Upstream, Some(3));
+    let mut fresh = One::new([None, Some(4)], 280.0, 400.0);
+    let late = Fence {
+        echo: 77,
+        number: 5,
+        ..fence(9, 450.0, 400.0)
+    };
+    last.receive(Side::Upstream, 3, late);
+    for _ in 0..8 {
+        fresh.receive(Side::Downstream, 4, last.sent(Side::Upstream));
+        last.receive(Side::Upstream, 3, fresh.sent(Side::Downstream));
+    }
+    assert_eq!(fresh.setpoint().to_bits(), 280.0_f32.to_bits());
+    assert!(last.guard.has_lost(Side::Upstream));
+}
+
+/// Checks that a late message with an earlier fence does not change the sender's agreed position.
+#[test]
+fn a_late_fence_does_not_restore_an_earlier_position() {
+    let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
+    pair.talk();
+    let late = pair.owner.sent(Side::Downstream);
+    pair.owner.guard.commit(at(20.0));
+    pair.owner.setpoint();
+    pair.owner.is_at(20.0);
+    pair.owner.is_at(20.0);
+    pair.talk();
+    let place = |pair: &Pair| pair.follower.guard.neighbour_place(Side::Upstream);
+    assert_eq!(place(&pair), Some(at(20.0)));
+    pair.follower.receive(Side::Upstream, 1, late);
+    assert_eq!(place(&pair), Some(at(20.0)));
+}
+
+/// Checks rule 9 for a relay with a number beyond that of a lost drone toward Rx.
+///
+/// Its x has to be beyond that of the drone, too.
+#[test]
+fn a_relay_before_a_lost_drone_with_a_lower_number_does_not_join() {
+    for (x_m, joins) in [(250.0, false), (350.0, true)] {
+        let mut one = One::new([None, Some(3)], 100.0, 100.0);
+        let mut lost = One::new([Some(1), None], 300.0, 300.0);
+        for _ in 0..4 {
+            lost.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+            one.receive(Side::Downstream, 3, lost.sent(Side::Upstream));
+        }
+        one.guard.set_neighbour(Side::Downstream, Some(4));
+        let mut fresh = One::new([Some(1), None], x_m, 400.0);
+        for _ in 0..4 {
+            fresh.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+            one.receive(Side::Downstream, 4, fresh.sent(Side::Upstream));
+        }
+        let expected_m = if joins { 400.0 } else { x_m };
+        assert_eq!(fresh.setpoint().to_bits(), expected_m.to_bits(), "{x_m}");
     }
 }
 

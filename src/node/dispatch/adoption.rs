@@ -3,12 +3,11 @@
 //! The setpoint depends on the drone's reports, which are handled here, too.
 
 use super::Node;
-use super::departure::Leaving;
 use crate::event::Event;
 use crate::features::UPLOAD;
 use crate::guard::HoldReason;
 use crate::mission::Mission;
-use crate::node::context::{Member, ProposalOutcome};
+use crate::node::context::{Member, ProposalOutcome, respacing};
 use crate::node::steering::Begin;
 use crate::place::Placement;
 use crate::settings::Method;
@@ -33,7 +32,12 @@ impl Node {
         let leads = place == 1;
         let (relays, usable_in) = match decided {
             ProposalOutcome::Granted { relays, usable_in } => (relays, usable_in),
-            ProposalOutcome::Superseded => {
+            ProposalOutcome::Superseded { view, usable_in } => {
+                if let Some(view) = view {
+                    let rest = now + Duration::from_millis(100).times(u32::from(usable_in));
+                    let views = (view, proposed.base.id);
+                    self.layers.lease.accept_decided(views, rest);
+                }
                 if leads {
                     self.layers.view.request.start(now);
                 }
@@ -69,7 +73,7 @@ impl Node {
             .lease
             .accept_view(now, views, rest, relays < before);
         if leads {
-            self.layers.lease.confirm_view();
+            self.layers.lease.confirm_view(proposed.view);
         }
         self.layers.round.renew(rest, leads, works);
         self.layers.leaving.end_order();
@@ -139,7 +143,7 @@ impl Node {
         let span = if self.layers.view.has_no_quorum() {
             Duration::from_micros(0)
         } else {
-            Leaving::respacing(&self.member.settings)
+            respacing(&self.member.settings)
         };
         // The order comes first: a relay that also requests to leave closes up to the relay that leaves now.
         let leaver = match self.layers.lease.orders().leaver {

@@ -113,11 +113,6 @@ impl Leaving {
         Self::default()
     }
 
-    /// Returns the duration of the motion to a newly agreed position.
-    pub(crate) const fn respacing(settings: &Settings) -> Duration {
-        settings.respacing
-    }
-
     pub(crate) const fn is_outside(&self) -> bool {
         self.outside_since.is_some()
     }

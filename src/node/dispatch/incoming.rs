@@ -211,7 +211,7 @@ impl Node {
                 if message.belongs_to_view() && message.is_onward() {
                     // An agreement or a lease renewal shows that all members have accepted the view.
                     layers.view.commit(self.member.view);
-                    layers.lease.confirm_view();
+                    layers.lease.confirm_view(self.member.view);
                 }
                 if let Message::Pulse(_) | Message::Pulsed(_) = message {
                     layers.lease.handle(&context, message)

@@ -23,10 +23,6 @@ impl Leaving {
         Self
     }
 
-    pub(crate) const fn respacing(_: &Settings) -> Duration {
-        Duration::from_micros(0)
-    }
-
     pub(crate) const fn is_outside(self) -> bool {
         false
     }

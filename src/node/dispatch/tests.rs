@@ -1,15 +1,21 @@
 //! Tests of one relay: received messages, and its replies and events.
 
 use crate::event::Event;
+#[cfg(feature = "departures")]
+use crate::guard::{self, Guard};
 use crate::mission::tests::paper;
 use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 use crate::node::Node;
+#[cfg(feature = "departures")]
+use crate::place::Placement;
 use crate::settings::{Identity, Settings, Wiring};
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::view::{View, ViewId};
 use crate::wire::auth::{Auth, Key};
 use crate::wire::digest::MissionId;
+#[cfg(feature = "departures")]
+use crate::wire::message::Orders;
 use crate::wire::message::{Hello, Message, Poll, Proposal};
 use crate::wire::upload::Upload;
 
@@ -464,4 +470,53 @@ fn a_relay_outside_proposes_nothing() {
     }
     node.stay(NOW + Duration::from_millis(200_000));
     assert_eq!(node.departure(NOW), crate::Departure::Member);
+}
+
+/// Checks that a motion without a common start time waits 15 s and the lead of the common start.
+///
+/// In chains of more than 125 relays the lead is longer than 15 s. A relay that begins alone must not be too early.
+#[cfg(feature = "departures")]
+#[test]
+fn a_motion_waits_for_the_lead_of_a_long_chain() {
+    let mut node = relay_of(Mission::try_new(paper(200)).unwrap(), 100, false);
+    node.member.settings.respacing = Duration::from_millis(20_000);
+    let place = |x_m: f32| Placement::on_line(x_m, 100.0);
+    let mut x_m = |agreed_m: f32, after_ms: u64| {
+        node.layers.round.set_agreed_place(place(agreed_m));
+        node.steer(NOW + Duration::from_millis(after_ms));
+        node.setpoint().unwrap().x_m
+    };
+    assert_eq!(x_m(500.0, 0).to_bits(), 500.0_f32.to_bits());
+    // 15 s, and 4 hop times for each relay.
+    let begins_ms = 15_000 + 4 * 30 * 200;
+    for after_ms in [1, 15_001, begins_ms] {
+        assert_eq!(x_m(600.0, after_ms).to_bits(), 500.0_f32.to_bits());
+    }
+    let half_m = x_m(600.0, begins_ms + 10_001);
+    assert!((half_m - 550.0).abs() < 0.1, "{half_m}");
+}
+
+/// Checks that an order to leave for another relay comes before the own request to leave.
+///
+/// It then closes up to the relay that leaves now, instead of holding its position.
+#[cfg(feature = "departures")]
+#[test]
+fn an_order_to_leave_comes_before_the_relays_own_request() {
+    let mut node = relay(false);
+    let settings = Settings {
+        guard: Some(guard::tests::config()),
+        ..node.member.settings
+    };
+    node.steering.begin(&settings, [Some(1), Some(3)], 1, NOW);
+    node.leave(NOW, None);
+    assert_eq!(node.leaves(), Some(false));
+    for (ordered, expected) in [(0, 2), (3, 3), (2, 2), (0, 2)] {
+        node.layers.lease.set_orders(Orders {
+            leaver: ordered,
+            ..Orders::NONE
+        });
+        node.steer(NOW);
+        let leaver = node.steering.known_guard().map(Guard::leaver);
+        assert_eq!(leaver, Some(expected));
+    }
 }

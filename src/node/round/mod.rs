@@ -258,6 +258,11 @@ impl Round {
         self.computation.discard_agreed_place();
     }
 
+    #[cfg(all(test, feature = "departures"))]
+    pub(crate) const fn set_agreed_place(&mut self, place: Placement) {
+        self.computation.agreed_place = Some(place);
+    }
+
     /// Schedules a retransmission of a message that awaits its reply. Called when the next relay is reachable again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();

@@ -373,7 +373,10 @@ impl ViewChange {
                 relays: view.relays,
                 usable_in,
             },
-            Some(_) => ProposalOutcome::Superseded,
+            Some(View { id, .. }) => ProposalOutcome::Superseded {
+                view: Some(id).filter(|id| self.electorate.is_polled_in(*id)),
+                usable_in,
+            },
             None => ProposalOutcome::NoQuorum,
         }))
     }

@@ -211,6 +211,11 @@ impl Electorate {
         }
     }
 
+    /// Returns true if this relay was polled in `view`, which is agreed on or can still become agreed.
+    pub(super) fn is_polled_in(&self, view: ViewId) -> bool {
+        self.voted.contains(&view) || self.member && self.agreed.id == view
+    }
+
     /// Returns true if this relay has accepted `view`, but does not know yet that the view is agreed on.
     pub(crate) fn awaits(&self, view: ViewId) -> bool {
         self.accepted
@@ -247,15 +252,15 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
+    /// Returns true if this relay has voted on `proposal` and does not know the decision yet.
+    pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
+        self.voted.contains(&proposal)
+    }
+
     /// Test helper: disables the quorum rule, a fault that the model check must find.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;
-    }
-
-    /// Returns true if this relay has voted on `proposal` and does not know the decision yet.
-    pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
-        self.voted.contains(&proposal)
     }
 }
 

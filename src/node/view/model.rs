@@ -12,10 +12,11 @@
 //! | pass | a relay that knows its view to be agreed on informs the next relay, if that is in the same view |
 //! | departure or join | a relay goes outside of the chain, where it has no neighbours, or comes back; its neighbours select each other |
 //! | reboot | the relay keeps only its acceptor state, or loses that, too |
+//! | renewal | in some checks: all members of a view renew their leases; time advances by 0.1 s |
 //!
-//! The numbers of cuts, proposals, reboots, departures and joins are bounded, nothing else is. Time is not modelled.
-//! The lease ensures in addition that positions of a view are not used before members of the previous view have
-//! released theirs.
+//! The numbers of cuts, proposals, reboots, departures, joins and renewals are bounded, nothing else is. Time is modelled
+//! only by renewals: no lease expires. The checks with renewals test the bounds of other relays' leases: positions of an
+//! agreed view are not used before every lease of an earlier view has ended.
 //!
 //! A view is *in force* from the time its leader knows that all members have accepted it until a successor is in force.
 //! Views that follow each other one by one are never in force together. So the check is that all agreed views form one
@@ -38,9 +39,10 @@ use crate::mission::tests::paper;
 use crate::node::circulation::{Circulation, LateMessages, Stage};
 use crate::node::context::OtherLeases;
 use crate::node::context::{Context, Effects, LayerEvent, Member, ProposalOutcome};
+use crate::node::lease::LeaseBounds;
 use crate::node::view::change::{ViewChange, ViewRequest};
 use crate::settings::Settings;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
@@ -88,6 +90,46 @@ fn departures_and_joins_keep_one_sequence_of_views() {
         }
         .holds();
     }
+}
+
+/// Checks that no positions of an agreed view are used while a relay has a lease of an earlier view. The chain has
+/// `relays` relays, of which those in the bit mask `outside` are outside at first.
+fn leases_end(relays: u16, outside: u8, (cuts, proposals, renewals, moves): (u8, u8, u8, u8)) {
+    Check {
+        cuts,
+        proposals,
+        outside,
+        moves,
+        renewals,
+        ..Check::of(relays)
+    }
+    .holds();
+}
+
+#[test]
+fn leases_of_earlier_views_have_ended() {
+    leases_end(3, 0, (2, 3, 2, 0));
+    leases_end(3, 0b100, (1, 3, 2, 1));
+    leases_end(4, 0, (1, 3, 2, 0));
+}
+
+/// Model check of the leases with more events than the test above; takes some minutes.
+#[test]
+#[ignore = "minutes"]
+fn leases_of_earlier_views_have_ended_in_more_states() {
+    leases_end(4, 0, (2, 3, 2, 0));
+    leases_end(3, 0, (3, 4, 2, 0));
+}
+
+/// Checks that the model check finds the fault of not waiting for the leases of earlier views.
+#[test]
+fn the_check_finds_the_fault_of_not_waiting_for_leases() {
+    let check = Check {
+        rule: Rule::AtOnce,
+        renewals: 1,
+        ..Check::of(3)
+    };
+    assert_eq!(check.search().unwrap().what, EARLIER_LEASES);
 }
 
 /// Checks that the model check finds a wrong rule for departures. By this rule a relay that leaves no longer counts for
@@ -151,6 +193,8 @@ pub(super) enum Body {
         agreed: SizedView,
         votes: u16,
         proposer: bool,
+        /// Fields `lease_left` and `earlier_lease_left` of the poll.
+        leases: [u16; 2],
         successor: Option<(ViewId, SizedView)>,
     },
     Decision {
@@ -159,6 +203,7 @@ pub(super) enum Body {
         reached: u16,
         base: SizedView,
         accepted: Option<SizedView>,
+        usable_in: u16,
     },
 }
 
@@ -175,6 +220,9 @@ pub(super) struct RelayState {
     pub(super) change: ViewChange,
     /// Last view that this relay accepted: its identifier, the relay's rank, and the number of members.
     pub(super) flies: (ViewId, u16, u16),
+    /// Bounds of other relays' leases, and the view and the end of this relay's own lease. Constant without renewals.
+    bounds: LeaseBounds,
+    lease: Option<(ViewId, Instant)>,
 }
 
 impl RelayState {
@@ -185,6 +233,8 @@ impl RelayState {
             change.proposed,
             change.electorate,
             self.flies,
+            self.bounds,
+            self.lease,
         )
     }
 }
@@ -232,6 +282,11 @@ pub(super) struct Chain {
     pub(super) outside: u8,
     /// Number of departures and joins that can still happen.
     pub(super) moves: u8,
+    /// Number of lease renewals that can still happen.
+    renewals: u8,
+    now: Instant,
+    /// Agreed views, and the times from which their positions may be used. Empty without renewals.
+    usable: Vec<(ViewId, Instant)>,
 }
 
 /// Event that can happen next in the model.
@@ -247,6 +302,8 @@ pub(super) enum ModelEvent {
     Forgets(usize),
     /// The relay with this list index leaves the chain, or joins it again.
     Moves(usize),
+    /// The leader with this list index renews the leases of its view, and all members receive this.
+    Renews(usize),
 }
 
 /// Inserts `one` into the sorted list `all`, unless the list contains it.
@@ -281,6 +338,7 @@ impl Body {
                 agreed,
                 votes,
                 proposer,
+                leases: [lease_left, earlier_lease_left],
                 successor,
             } => Message::Proposal(Proposal {
                 mission_id,
@@ -290,8 +348,8 @@ impl Body {
                     agreed: view(agreed),
                     votes,
                     proposer,
-                    lease_left: 0,
-                    earlier_lease_left: 0,
+                    lease_left,
+                    earlier_lease_left,
                     successor: successor.map(|(proposal, of)| Successor {
                         proposal,
                         view: view(of),
@@ -304,6 +362,7 @@ impl Body {
                 reached: there,
                 base,
                 accepted: of,
+                usable_in,
             } => Message::Decision(Decision {
                 mission_id,
                 proposed_view: proposal,
@@ -311,9 +370,18 @@ impl Body {
                 reached: there,
                 base: view(base),
                 accepted: of.map(view),
-                usable_in: 0,
+                usable_in,
             }),
         }
+    }
+
+    /// Returns the message without the times of leases, which would increase the number of states.
+    fn untimed(mut self) -> Self {
+        match &mut self {
+            Self::Proposal { leases, .. } => *leases = [0; 2],
+            Self::Decision { usable_in, .. } => *usable_in = 0,
+        }
+        self
     }
 
     pub(super) fn of(message: &Message) -> Option<Self> {
@@ -325,6 +393,7 @@ impl Body {
                 agreed: sized(proposal.poll.agreed),
                 votes: proposal.poll.votes,
                 proposer: proposal.poll.proposer,
+                leases: [proposal.poll.lease_left, proposal.poll.earlier_lease_left],
                 successor: proposal
                     .poll
                     .successor
@@ -336,6 +405,7 @@ impl Body {
                 reached: decision.reached,
                 base: sized(decision.base),
                 accepted: decision.accepted.map(sized),
+                usable_in: decision.usable_in,
             }),
             _ => None,
         }
@@ -349,6 +419,8 @@ pub(super) enum Rule {
     Members,
     /// Broken rule, for a test: a departure reduces the quorum at all other relays at once.
     Inside,
+    /// Broken rule, for a test: positions of an agreed view are used at once.
+    AtOnce,
     /// Broken rule, for a test: every reachable relay votes. The quorum is that of the newest view that any reachable
     /// relay knows.
     Everybody,
@@ -367,6 +439,8 @@ pub(super) struct Check {
     /// Relays that are outside of the chain at first, as a bit mask.
     pub(super) outside: u8,
     pub(super) moves: u8,
+    /// Number of lease renewals. Without any, the leases are not modelled.
+    pub(super) renewals: u8,
     /// True to check in every state that the chain agrees on a view once all links are restored.
     pub(super) heals: bool,
 }
@@ -406,6 +480,7 @@ impl Check {
             losses: 0,
             outside: 0,
             moves: 0,
+            renewals: 0,
             heals: false,
         }
     }
@@ -415,17 +490,23 @@ impl Check {
         RelayState {
             change: ViewChange::new(relays, 1, 1),
             flies: (ViewId::LOADED, 0, relays),
+            bounds: LeaseBounds::new(Instant::ZERO, &self.members[0].settings),
+            lease: None,
         }
     }
 
     pub(super) fn context(&self, chain: &Chain, at: usize) -> Context<'_> {
         let member = &self.members[at];
         Context {
-            now: Instant::ZERO,
+            now: chain.now,
             member,
             latest: member.active,
             is_last_reachable: chain.after(at).is_none(),
-            other_leases: OtherLeases::NONE,
+            other_leases: if self.renewals == 0 {
+                OtherLeases::NONE
+            } else {
+                chain.relays[at].bounds.other_leases(chain.now)
+            },
         }
     }
 
@@ -453,11 +534,15 @@ impl Check {
             air,
             decided: decrees,
             agreed,
+            usable,
+            now,
             ..
         } = chain;
         let unit = &mut units[at];
+        let is_timed = self.renewals > 0;
         let mut send = |to: usize, message: &Message| {
             if let Some(body) = Body::of(message) {
+                let body = if is_timed { body } else { body.untimed() };
                 let from = at;
                 insert_sorted(air, Frame { from, to, body });
             }
@@ -475,8 +560,31 @@ impl Check {
         if let Some(proposed) = unit.change.proposed
             && let Some(LayerEvent::ProposalDecided(decided)) = effects.event
         {
-            if let ProposalOutcome::Granted { relays, .. } = decided {
-                unit.flies = (proposed.view, proposed.rank, relays);
+            let rest = |usable_in: u16| *now + Duration::from_millis(100).times(usable_in.into());
+            let base = proposed.base.id;
+            match decided {
+                ProposalOutcome::Granted { relays, usable_in } => {
+                    unit.flies = (proposed.view, proposed.rank, relays);
+                    if is_timed {
+                        unit.bounds.accept((proposed.view, base), rest(usable_in));
+                        unit.lease = None;
+                    }
+                    if is_timed && proposed.rank == 1 {
+                        unit.bounds.confirm(proposed.view);
+                        let waits = if self.rule == Rule::AtOnce {
+                            0
+                        } else {
+                            usable_in
+                        };
+                        insert_sorted(usable, (proposed.view, rest(waits)));
+                    }
+                }
+                ProposalOutcome::Superseded { view, usable_in } => {
+                    if let Some(view) = view.filter(|_| is_timed) {
+                        unit.bounds.accept((view, base), rest(usable_in));
+                    }
+                }
+                ProposalOutcome::NoQuorum => {}
             }
             if let Some(view) = proposed.accepted {
                 if view.id == proposed.view && view.relays == proposed.rank {
@@ -555,7 +663,7 @@ impl Check {
         let Some(to) = chain.after(at) else {
             return;
         };
-        let RelayState { change, flies } = &chain.relays[at];
+        let RelayState { change, flies, .. } = &chain.relays[at];
         let (view, place, _) = *flies;
         let knows = change.electorate.agreed().id == view && change.outstanding().is_none();
         let next = &mut chain.relays[to];
@@ -565,6 +673,38 @@ impl Check {
             && next.flies.1 == place + 1
         {
             next.change.commit(view);
+            next.bounds.confirm(view);
+        }
+    }
+
+    /// Renews the leases of the view of the relay with list index `leader`.
+    ///
+    /// No effect unless all members can take part, and the relay leads them.
+    fn renew(&self, chain: &mut Chain, leader: usize) {
+        let (view, _, relays) = chain.relays[leader].flies;
+        let mut members = vec![leader];
+        while let Some(next) = members.last().and_then(|at| chain.after(*at)) {
+            members.push(next);
+        }
+        members.truncate(relays.into());
+        let takes_part = |(at, rank): (&usize, u16)| {
+            let RelayState { change, flies, .. } = &chain.relays[*at];
+            let rank = if view == ViewId::LOADED { 0 } else { rank };
+            *flies == (view, rank, relays) && change.outstanding().is_none()
+        };
+        let knows = chain.relays[leader].change.electorate.agreed().id >= view;
+        let all = members.len() == usize::from(relays) && members.iter().zip(1..).all(takes_part);
+        if !(all && knows) {
+            return;
+        }
+        chain.now = chain.now + Duration::from_millis(100);
+        let until = chain.now + self.members[leader].settings.dead_after;
+        for at in members {
+            let relay = &mut chain.relays[at];
+            relay.change.commit(view);
+            relay.bounds.confirm(view);
+            relay.bounds.vouch(view, until);
+            relay.lease = Some((view, until));
         }
     }
 
@@ -638,6 +778,19 @@ impl Check {
     }
 }
 
+/// Name of the safety property of leases: they end before positions of a later view may be used.
+pub(super) const EARLIER_LEASES: &str = "leases of earlier views end before positions are used";
+
+impl Chain {
+    fn has_ended_leases(&self) -> bool {
+        let leases = self.relays.iter().filter_map(|relay| relay.lease);
+        leases.into_iter().all(|(view, end)| {
+            let later = self.usable.iter().filter(|(later, _)| *later > view);
+            later.into_iter().all(|(_, from)| end <= *from)
+        })
+    }
+}
+
 /// Maximum number of proposals until the chain must have agreed on a view, once its links are restored.
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
@@ -702,7 +855,7 @@ impl Check {
             let settled = (0..chain.relays.len())
                 .filter(|at| there >> at & 1 == 1)
                 .all(|at| {
-                    let RelayState { change, flies } = &chain.relays[at];
+                    let RelayState { change, flies, .. } = &chain.relays[at];
                     let knows = change.electorate.agreed() == agreed && change.electorate.member;
                     knows
                         && change.circulation.stage() != Stage::Outstanding
@@ -750,6 +903,9 @@ impl Model for Check {
             losses: self.losses,
             outside: self.outside,
             moves: self.moves,
+            renewals: self.renewals,
+            now: Instant::ZERO,
+            usable: vec![],
         };
         for at in 0..relays {
             self.apply_effects(&mut chain, at, Effects::NONE);
@@ -776,6 +932,9 @@ impl Model for Check {
                 ModelEvent::Repeats(at),
                 ModelEvent::Passes(at),
             ]);
+            if chain.renewals > 0 && chain.before(at).is_none() {
+                actions.push(ModelEvent::Renews(at));
+            }
             if chain.reboots > 0 {
                 actions.push(ModelEvent::Reboots(at));
             }
@@ -800,6 +959,7 @@ impl Model for Check {
             ModelEvent::Reboots(at) => self.reboot(&mut chain, at, true),
             ModelEvent::Forgets(at) => self.reboot(&mut chain, at, false),
             ModelEvent::Moves(at) => self.move_relay(&mut chain, at),
+            ModelEvent::Renews(at) => self.renew(&mut chain, at),
         }
         if chain == *before {
             return None;
@@ -810,6 +970,7 @@ impl Model for Check {
             ModelEvent::Reboots(_) => chain.reboots -= 1,
             ModelEvent::Forgets(_) => chain.losses -= 1,
             ModelEvent::Moves(_) => chain.moves -= 1,
+            ModelEvent::Renews(_) => chain.renewals -= 1,
             _ => {}
         }
         Some(chain)
@@ -818,6 +979,7 @@ impl Model for Check {
     fn properties(&self) -> Vec<Property<Self>> {
         vec![
             Property::always(ONE_CHAIN, |_, chain| Self::is_one_chain(chain)),
+            Property::always(EARLIER_LEASES, |_, chain: &Chain| chain.has_ended_leases()),
             Property::always(
                 "no view that is decided or agreed on has two different numbers of relays",
                 |_, chain| Self::has_one_size(chain),
@@ -855,11 +1017,12 @@ impl Check {
             losses,
             outside,
             moves,
+            renewals,
             heals,
             ..
         } = self;
         println!(
-            "view model: {} relays, quorum rule {rule:?}, at most {cuts} partitions, {proposals} proposals, {reboots} reboots, {moves} departures or joins (relays outside of the chain at first: {outside:b}), {losses} losses of stored votes, \
+            "view model: {} relays, quorum rule {rule:?}, at most {cuts} partitions, {proposals} proposals, {reboots} reboots, {moves} departures or joins (relays outside of the chain at first: {outside:b}), {losses} losses of stored votes, {renewals} lease renewals, \
              links restored at the end: {heals}; searched {} states to depth {} in {:.1} s",
             self.members.len(),
             checker.unique_state_count(),

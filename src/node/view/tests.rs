@@ -298,7 +298,11 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     let second = relay.view.electorate.promised();
     assert!(second > id(2, 3));
     let decision = relay.decision(second, Some(earlier));
-    assert_eq!(relay.handle(&decision), came(ProposalOutcome::Superseded));
+    let superseded = ProposalOutcome::Superseded {
+        view: Some(earlier.id),
+        usable_in: 0,
+    };
+    assert_eq!(relay.handle(&decision), came(superseded));
     assert_eq!(relay.view.electorate.agreed(), earlier);
     assert!(relay.view.electorate.member);
     assert_eq!(relay.view.poll_back(), None, "nobody is before it");
@@ -412,10 +416,11 @@ fn an_accepted_successor_is_reported_and_decided_again() {
     proposal.place = 2;
     proposal.poll.votes = 2;
     let decided = relay.handle(&Message::Proposal(proposal)).event;
-    assert_eq!(
-        decided,
-        Some(LayerEvent::ProposalDecided(ProposalOutcome::Superseded))
-    );
+    let superseded = ProposalOutcome::Superseded {
+        view: Some(first.id),
+        usable_in: 0,
+    };
+    assert_eq!(decided, Some(LayerEvent::ProposalDecided(superseded)));
     let poll = relay.view.proposed.unwrap().poll;
     assert_eq!(
         poll.successor,
