@@ -416,6 +416,23 @@ fn a_spare_joins_before_a_relay_leaves() {
     }
 }
 
+/// Checks that a spare at an end of the chain joins as soon as it is called: no lease expires meanwhile.
+#[test]
+fn a_spare_at_an_end_joins_at_once() {
+    for (spare, leaver) in [(9, 4), (9, 8), (1, 4), (1, 2)] {
+        let mut setup = departing(9, &[(leaver, None)]);
+        setup.spares = vec![spare];
+        let outcome = run(setup.clone()).unwrap();
+        let name = format!("spare {spare}, leaver {leaver}");
+        let free = freed(&outcome, leaver).unwrap();
+        println!("{name}: free after {free:.1} s");
+        let since = seconds(AT_S);
+        let mut losses = outcome.moments.iter().filter(|it| it.at > since);
+        let lost = losses.find(|moment| is_loss(moment.what));
+        assert!(lost.is_none() && free < 60.0, "{name}: {free:.1} s, {lost:?}");
+    }
+}
+
 /// Draws a scene of nine relays of equal altitude and power, with Tx and Rx 500 m to 3 km apart. The interferer's x is between Tx and Rx,
 /// its y is 0.1 to 1 times the distance from Tx to Rx.
 fn scene(rng: &mut ChaCha8Rng) -> Link {

@@ -72,7 +72,7 @@ impl Node {
             self.layers.lease.confirm_view();
         }
         self.layers.round.renew(rest, leads, works);
-        self.layers.leaving.end_order();
+        self.layers.leaving.on_new_view();
         bump(&mut self.telemetry.stats.views);
         self.telemetry.lapse_reported = false;
         self.telemetry.no_quorum_reported = false;

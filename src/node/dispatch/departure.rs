@@ -131,10 +131,16 @@ impl Leaving {
         self.place = Some(place);
     }
 
-    /// Ends the order to leave, which was given in the previous view. Called when a view is adopted.
-    pub(crate) const fn end_order(&mut self) {
+    /// Ends the order to leave.
+    const fn end_order(&mut self) {
         self.ordered_at = None;
         self.passed = [false; 2];
+    }
+
+    /// Ends the orders of the previous view. A spare that it called is now a member; the others send hellos soon.
+    pub(crate) const fn on_new_view(&mut self) {
+        self.end_order();
+        self.heard_spare = None;
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
@@ -558,6 +564,10 @@ impl Node {
                     || now.since(called_at) >= settings.dead_after
                 {
                     self.come_back(now);
+                    if hello.neighbour == 0 {
+                        // The caller is an end of the chain, so this relay is the next end and searches for nobody beyond.
+                        self.layers.neighbours.at_mut(side.other()).give_up(now, true);
+                    }
                 }
             }
             return true;
