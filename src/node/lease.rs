@@ -214,6 +214,14 @@ impl Lease {
         orders
     }
 
+    /// Records that this leader has joined a view of `relays` relays as the spare for a departure. Then no second spare is
+    /// called for it.
+    pub(crate) fn exclude_joined(&mut self, relays: u16) {
+        if let Some(known) = self.departures.first_mut() {
+            known.complement = relays.saturating_sub(1);
+        }
+    }
+
     /// Extends `vouched_until` by the maximum duration of a lease, after a restart of this relay. Other members may
     /// still have leases that they got before the restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {

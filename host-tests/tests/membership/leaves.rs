@@ -429,7 +429,59 @@ fn a_spare_at_an_end_joins_at_once() {
         let since = seconds(AT_S);
         let mut losses = outcome.moments.iter().filter(|it| it.at > since);
         let lost = losses.find(|moment| is_loss(moment.what));
-        assert!(lost.is_none() && free < 60.0, "{name}: {free:.1} s, {lost:?}");
+        assert!(
+            lost.is_none() && free < 60.0,
+            "{name}: {free:.1} s, {lost:?}"
+        );
+    }
+}
+
+/// Checks that only one of two spares joins for one departure, also if the first one becomes the leader.
+#[test]
+fn one_spare_joins_for_one_departure() {
+    let mut setup = departing(9, &[(2, None)]);
+    setup.spares = vec![1, 9];
+    setup.settings.respacing = Duration::from_millis(10_000);
+    let outcome = run(setup.clone()).unwrap();
+    let moments = outcome.moments.iter();
+    let mut sizes: Vec<u16> = moments
+        .filter_map(|moment| match moment.what {
+            TimelineEvent::ViewAccepted { relays, .. } => Some(relays),
+            _ => None,
+        })
+        .collect();
+    sizes.dedup();
+    println!("{sizes:?}, free after {:?} s", freed(&outcome, 2));
+    assert_eq!(sizes, [7, 8, 7]);
+}
+
+/// Checks that a departure waits for a spare whose hellos are lost for a time, also if the spare has just started.
+#[test]
+fn a_spare_joins_first_although_hellos_are_lost() {
+    for starts_s in [0, 88] {
+        let mut alone = Vec::new();
+        for seed in 1..=60 {
+            let mut setup = departing(6, &[(4, None)]);
+            setup.leaves[0].1 = seconds(100);
+            setup.faults.loss = 0.6;
+            setup.seed = seed;
+            setup.spares = vec![3];
+            if starts_s > 0 {
+                setup.kills = vec![(3, seconds(0))];
+                setup.boots = vec![(3, seconds(starts_s))];
+            }
+            let outcome = run(setup.clone()).unwrap();
+            let mut after = outcome.moments.iter().filter(|it| it.at > seconds(100));
+            let first = after.find_map(|moment| match moment.what {
+                TimelineEvent::ViewAccepted { relays, .. } => Some(relays),
+                _ => None,
+            });
+            if first.is_some_and(|relays| relays < 6) {
+                alone.push(seed);
+            }
+        }
+        println!("start after {starts_s} s: no spare joins first with the seeds {alone:?}");
+        assert!(alone.is_empty());
     }
 }
 

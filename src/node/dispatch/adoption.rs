@@ -72,7 +72,9 @@ impl Node {
             self.layers.lease.confirm_view();
         }
         self.layers.round.renew(rest, leads, works);
-        self.layers.leaving.on_new_view();
+        if self.layers.leaving.on_new_view() && leads {
+            self.layers.lease.exclude_joined(relays);
+        }
         bump(&mut self.telemetry.stats.views);
         self.telemetry.lapse_reported = false;
         self.telemetry.no_quorum_reported = false;

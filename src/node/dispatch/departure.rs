@@ -86,7 +86,8 @@ pub(crate) struct Leaving {
     free: bool,
     /// True while the drone has too little endurance for a return to the chain.
     spent: bool,
-    /// Time of the first order to leave since the request; `None` without an order.
+    /// Time of the first order to leave since the request, or of the first call to a spare until it has joined; `None`
+    /// without an order.
     ordered_at: Option<Instant>,
     /// Time at which this relay follows the last orders again.
     ///
@@ -138,9 +139,13 @@ impl Leaving {
     }
 
     /// Ends the orders of the previous view. A spare that it called is now a member; the others send hellos soon.
-    pub(crate) const fn on_new_view(&mut self) {
+    ///
+    /// Returns true if this relay was called to join, as a spare.
+    pub(crate) const fn on_new_view(&mut self) -> bool {
+        let was_called = self.ordered_at.is_some() && !self.requested;
         self.end_order();
         self.heard_spare = None;
+        was_called
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
@@ -149,9 +154,10 @@ impl Leaving {
 
     /// Returns the spare (relay that waits outside) that this relay has recently received; 0 for none.
     fn spare(&self, now: Instant, settings: &Settings) -> u16 {
+        // A spare that receives no answer sends its next hellos after `dead_after`.
         let known = self
             .heard_spare
-            .filter(|(_, at)| now.since(*at) < settings.dead_after);
+            .filter(|(_, at)| now.since(*at) < settings.dead_after.times(2));
         known.map_or(0, |(node, _)| node)
     }
 
@@ -564,9 +570,13 @@ impl Node {
                     || now.since(called_at) >= settings.dead_after
                 {
                     self.come_back(now);
+                    self.layers.leaving.ordered_at = Some(called_at);
                     if hello.neighbour == 0 {
                         // The caller is an end of the chain, so this relay is the next end and searches for nobody beyond.
-                        self.layers.neighbours.at_mut(side.other()).give_up(now, true);
+                        self.layers
+                            .neighbours
+                            .at_mut(side.other())
+                            .give_up(now, true);
                     }
                 }
             }
