@@ -436,6 +436,36 @@ fn a_spare_at_an_end_joins_at_once() {
     }
 }
 
+/// Checks that in a chain of two relays each one can leave once a spare has joined.
+#[test]
+fn a_spare_lets_each_of_two_relays_leave() {
+    for (leaver, spare) in [(1, 3), (2, 3), (1, 2), (3, 2), (2, 1), (3, 1)] {
+        let mut setup = departing(3, &[(leaver, Some(300))]);
+        setup.spares = vec![spare];
+        let outcome = run(setup.clone()).unwrap();
+        let name = format!("spare {spare}, leaver {leaver}");
+        println!("{name}: free after {:?} s", freed(&outcome, leaver));
+        assert!(
+            freed(&outcome, leaver).is_some_and(|free| free < 60.0),
+            "{name}"
+        );
+        let left: Vec<u16> = (1..=3).filter(|relay| *relay != leaver).collect();
+        judge(&setup, &outcome, &left).unwrap_or_else(|what| panic!("{name}: {what}"));
+        // A spare that dies as it joins: the chain remains. Later, a view of two that loses its proposer has no quorum.
+        for tenths in (0..40).step_by(4) {
+            let mut dies = setup.clone();
+            dies.kills = vec![(spare, Instant::from_millis(1_000 * AT_S + 100 * tenths))];
+            let outcome = run(dies.clone()).unwrap();
+            let name = format!("{name}, dead after {tenths} tenths");
+            let is_free = freed(&outcome, leaver).is_some();
+            let left: Vec<u16> = (1..=3)
+                .filter(|relay| *relay != spare && !(is_free && *relay == leaver))
+                .collect();
+            judge(&dies, &outcome, &left).unwrap_or_else(|what| panic!("{name}: {what}"));
+        }
+    }
+}
+
 /// Checks that only one of two spares joins for one departure, also if the first one becomes the leader.
 #[test]
 fn one_spare_joins_for_one_departure() {

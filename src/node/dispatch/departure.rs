@@ -53,7 +53,8 @@ pub enum Departure {
     /// Departure refused: with a separate link to each neighbour, the neighbours do not receive each other. See
     /// [`Wiring::Pair`](crate::Wiring::Pair).
     NeedsChannel,
-    /// Departure refused for now: no relay would remain, or the remaining relays would have no quorum.
+    /// Departure refused for now: no relay would remain, or the remaining relays would have no quorum. If a spare is
+    /// known, the leader calls it first.
     NeedsQuorum,
     /// Departure refused for now: the node numbers of this relay's neighbours differ by more than four.
     WideGap,
@@ -179,19 +180,7 @@ impl Leaving {
 impl Layers {
     /// Returns the reason why this relay cannot leave the chain now; `None` if it can leave.
     fn departure_refusal(&self, now: Instant, member: &Member) -> Option<Departure> {
-        let Member {
-            node,
-            mission,
-            settings,
-            view,
-            ..
-        } = member;
-        let relays = u32::from(mission.relays());
-        let proposer = match *view {
-            ViewId::LOADED => mission.leader(),
-            view => view.proposer(),
-        };
-        let weight = 2 * relays.saturating_sub(1) + u32::from(proposer != *node);
+        let Member { node, settings, .. } = member;
         let [before, after] =
             [Side::Upstream, Side::Downstream].map(|side| self.neighbours.at(side).node());
         // A spare between this relay and a neighbour joins first.
@@ -206,7 +195,7 @@ impl Layers {
             Some(Departure::NeedsChannel)
         } else if settings.guard.is_none() && !settings.leave_without_guard {
             Some(Departure::NeedsGuard)
-        } else if relays < 2 || settings.quorum && weight <= relays {
+        } else if !member.keeps_quorum_without(*node) {
             Some(Departure::NeedsQuorum)
         } else if before != 0 && after != 0 && width > CANDIDATES {
             Some(Departure::WideGap)
@@ -227,7 +216,12 @@ impl Layers {
         } = self.leaving;
         // 0 is the mark of the relay that has the order to leave.
         let endurance_s = lasts_until.map_or(u16::MAX, |at| (tenths(at.since(now)) / 10).max(1));
-        let leaves = requested && self.departure_refusal(now, member).is_none();
+        let leaves = requested
+            && match self.departure_refusal(now, member) {
+                // Once a spare has joined, the others have a quorum.
+                Some(Departure::NeedsQuorum) => self.lease.knows_spare(),
+                refused => refused.is_none(),
+            };
         let ordered = self.lease.orders().leaver == member.node;
         let requests = Requests {
             leaver: if leaves { member.node } else { 0 },
