@@ -416,7 +416,7 @@ fn a_spare_joins_before_a_relay_leaves() {
     }
 }
 
-/// Checks that a spare at an end of the chain joins as soon as it is called: no lease expires meanwhile.
+/// Checks that a spare at an end of the chain joins as soon as it is called, so that no lease expires.
 #[test]
 fn a_spare_at_an_end_joins_at_once() {
     for (spare, leaver) in [(9, 4), (9, 8), (1, 4), (1, 2)] {
@@ -466,7 +466,7 @@ fn a_spare_lets_each_of_two_relays_leave() {
     }
 }
 
-/// Checks that only one of two spares joins for one departure, also if the first one becomes the leader.
+/// Checks that one of two spares joins for one departure, also if this spare becomes the leader.
 #[test]
 fn one_spare_joins_for_one_departure() {
     let mut setup = departing(9, &[(2, None)]);
@@ -485,7 +485,9 @@ fn one_spare_joins_for_one_departure() {
     assert_eq!(sizes, [7, 8, 7]);
 }
 
-/// Checks that a departure waits for a spare whose hellos are lost for a time, also if the spare has just started.
+/// Checks that a departure waits for a spare whose hellos are lost for a time.
+///
+/// The spare started long before, or 12 s before.
 #[test]
 fn a_spare_joins_first_although_hellos_are_lost() {
     for starts_s in [0, 88] {

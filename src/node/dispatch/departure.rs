@@ -87,8 +87,9 @@ pub(crate) struct Leaving {
     free: bool,
     /// True while the drone has too little endurance for a return to the chain.
     spent: bool,
-    /// Time of the first order to leave since the request, or of the first call to a spare until it has joined; `None`
-    /// without an order.
+    /// Time of the first order to leave since the request; `None` without an order.
+    ///
+    /// At a spare that has not joined yet: time of the first call.
     ordered_at: Option<Instant>,
     /// Time at which this relay follows the last orders again.
     ///
