@@ -83,6 +83,17 @@ impl Member {
         node >= 1 && node <= self.all
     }
 
+    /// Returns true if the other relays of the view have a quorum without its member `node`, or need none.
+    pub(crate) const fn keeps_quorum_without(&self, node: u16) -> bool {
+        let relays = self.mission.relays();
+        let proposer = match self.view {
+            ViewId::LOADED => self.mission.leader(),
+            view => view.proposer(),
+        };
+        let weight = 2 * relays.saturating_sub(1) + (proposer != node) as u16;
+        relays >= 2 && (!self.settings.quorum || weight > relays)
+    }
+
     /// Returns a digest of the active mission and the accepted view. Every message of an agreement on positions
     /// contains it.
     pub(crate) const fn pass_digest(&self) -> u16 {

@@ -220,6 +220,11 @@ impl Lease {
         }
     }
 
+    /// Returns true if a relay of the view receives a spare, as far as this relay knows. The leader knows it of all.
+    pub(crate) fn knows_spare(&self) -> bool {
+        self.orders.joiner != 0 || self.requests.is_some_and(|it| it.spare != 0)
+    }
+
     pub(crate) const fn orders(&self) -> Orders {
         self.orders
     }
@@ -268,7 +273,8 @@ impl Lease {
         }
         let waited = now.since(known.leaver.1);
         let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
-        let late = waited >= most || waited >= left;
+        let may_leave = context.member.keeps_quorum_without(requests.leaver);
+        let late = may_leave && (waited >= most || waited >= left);
         // A spare is silent between the order to join and its arrival.
         let spare = if requests.spare == 0 {
             self.orders.joiner
@@ -279,10 +285,18 @@ impl Lease {
         let settled = in_place && self.orders.in_place;
         if joins && (settled || self.orders.joiner != 0) {
             orders.joiner = spare;
-        } else if !joins && (settled || late) {
+        } else if !joins && may_leave && (settled || late) {
             orders.leaver = requests.leaver;
         }
         orders
+    }
+
+    /// Records that this leader has joined a view of `relays` relays as the spare for a departure. Then no second spare is
+    /// called for it.
+    pub(crate) fn exclude_joined(&mut self, relays: u16) {
+        if let Some(known) = self.departures.first_mut() {
+            known.complement = relays.saturating_sub(1);
+        }
     }
 
     /// Extends `vouched_until` by the maximum duration of a lease, after a restart of this relay. Other members may

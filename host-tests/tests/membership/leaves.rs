@@ -413,6 +413,107 @@ fn a_spare_joins_before_a_relay_leaves() {
     }
 }
 
+/// Checks that a spare at an end of the chain joins as soon as it is called, so that no lease expires.
+#[test]
+fn a_spare_at_an_end_joins_at_once() {
+    for (spare, leaver) in [(9, 4), (9, 8), (1, 4), (1, 2)] {
+        let mut setup = departing(9, &[(leaver, None)]);
+        setup.spares = vec![spare];
+        let outcome = run(setup.clone()).unwrap();
+        let name = format!("spare {spare}, leaver {leaver}");
+        let free = freed(&outcome, leaver).unwrap();
+        println!("{name}: free after {free:.1} s");
+        let since = seconds(AT_S);
+        let mut losses = outcome.moments.iter().filter(|it| it.at > since);
+        let lost = losses.find(|moment| is_loss(moment.what));
+        assert!(
+            lost.is_none() && free < 60.0,
+            "{name}: {free:.1} s, {lost:?}"
+        );
+    }
+}
+
+/// Checks that in a chain of two relays each one can leave once a spare has joined.
+#[test]
+fn a_spare_lets_each_of_two_relays_leave() {
+    for (leaver, spare) in [(1, 3), (2, 3), (1, 2), (3, 2), (2, 1), (3, 1)] {
+        let mut setup = departing(3, &[(leaver, Some(300))]);
+        setup.spares = vec![spare];
+        let outcome = run(setup.clone()).unwrap();
+        let name = format!("spare {spare}, leaver {leaver}");
+        println!("{name}: free after {:?} s", freed(&outcome, leaver));
+        assert!(
+            freed(&outcome, leaver).is_some_and(|free| free < 60.0),
+            "{name}"
+        );
+        let left: Vec<u16> = (1..=3).filter(|relay| *relay != leaver).collect();
+        judge(&setup, &outcome, &left).unwrap_or_else(|what| panic!("{name}: {what}"));
+        // A spare that dies as it joins: the chain remains. Later, a view of two that loses its proposer has no quorum.
+        for tenths in (0..40).step_by(4) {
+            let mut dies = setup.clone();
+            dies.kills = vec![(spare, Instant::from_millis(1_000 * AT_S + 100 * tenths))];
+            let outcome = run(dies.clone()).unwrap();
+            let name = format!("{name}, dead after {tenths} tenths");
+            let is_free = freed(&outcome, leaver).is_some();
+            let left: Vec<u16> = (1..=3)
+                .filter(|relay| *relay != spare && !(is_free && *relay == leaver))
+                .collect();
+            judge(&dies, &outcome, &left).unwrap_or_else(|what| panic!("{name}: {what}"));
+        }
+    }
+}
+
+/// Checks that one of two spares joins for one departure, also if this spare becomes the leader.
+#[test]
+fn one_spare_joins_for_one_departure() {
+    let mut setup = departing(9, &[(2, None)]);
+    setup.spares = vec![1, 9];
+    setup.settings.respacing = Duration::from_millis(10_000);
+    let outcome = run(setup.clone()).unwrap();
+    let moments = outcome.moments.iter();
+    let mut sizes: Vec<u16> = moments
+        .filter_map(|moment| match moment.what {
+            TimelineEvent::ViewAccepted { relays, .. } => Some(relays),
+            _ => None,
+        })
+        .collect();
+    sizes.dedup();
+    println!("{sizes:?}, free after {:?} s", freed(&outcome, 2));
+    assert_eq!(sizes, [7, 8, 7]);
+}
+
+/// Checks that a departure waits for a spare whose hellos are lost for a time.
+///
+/// The spare started long before, or 12 s before.
+#[test]
+fn a_spare_joins_first_although_hellos_are_lost() {
+    for starts_s in [0, 88] {
+        let mut alone = Vec::new();
+        for seed in 1..=60 {
+            let mut setup = departing(6, &[(4, None)]);
+            setup.leaves[0].1 = seconds(100);
+            setup.faults.loss = 0.6;
+            setup.seed = seed;
+            setup.spares = vec![3];
+            if starts_s > 0 {
+                setup.kills = vec![(3, seconds(0))];
+                setup.boots = vec![(3, seconds(starts_s))];
+            }
+            let outcome = run(setup.clone()).unwrap();
+            let mut after = outcome.moments.iter().filter(|it| it.at > seconds(100));
+            let first = after.find_map(|moment| match moment.what {
+                TimelineEvent::ViewAccepted { relays, .. } => Some(relays),
+                _ => None,
+            });
+            if first.is_some_and(|relays| relays < 6) {
+                alone.push(seed);
+            }
+        }
+        println!("start after {starts_s} s: no spare joins first with the seeds {alone:?}");
+        assert!(alone.is_empty());
+    }
+}
+
 /// Draws a scene of nine relays of equal altitude and power, with Tx and Rx 500 m to 3 km apart. The interferer's x is between Tx and Rx,
 /// its y is 0.1 to 1 times the distance from Tx to Rx.
 fn scene(rng: &mut ChaCha8Rng) -> Link {

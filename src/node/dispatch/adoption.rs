@@ -76,7 +76,9 @@ impl Node {
             self.layers.lease.confirm_view(proposed.view);
         }
         self.layers.round.renew(rest, leads, works);
-        self.layers.leaving.end_order();
+        if self.layers.leaving.on_new_view() && leads {
+            self.layers.lease.exclude_joined(relays);
+        }
         bump(&mut self.telemetry.stats.views);
         self.telemetry.lapse_reported = false;
         self.telemetry.no_quorum_reported = false;

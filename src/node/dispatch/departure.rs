@@ -53,7 +53,8 @@ pub enum Departure {
     /// Departure refused: with a separate link to each neighbour, the neighbours do not receive each other. See
     /// [`Wiring::Pair`](crate::Wiring::Pair).
     NeedsChannel,
-    /// Departure refused for now: no relay would remain, or the remaining relays would have no quorum.
+    /// Departure refused for now: no relay would remain, or the remaining relays would have no quorum. If a spare is
+    /// known, the leader calls it first.
     NeedsQuorum,
     /// Departure refused for now: the node numbers of this relay's neighbours differ by more than four.
     WideGap,
@@ -87,6 +88,8 @@ pub(crate) struct Leaving {
     /// True while the drone has too little endurance for a return to the chain.
     spent: bool,
     /// Time of the first order to leave since the request; `None` without an order.
+    ///
+    /// At a spare that has not joined yet: time of the first call.
     ordered_at: Option<Instant>,
     /// Time at which this relay follows the last orders again.
     ///
@@ -126,10 +129,20 @@ impl Leaving {
         self.place = Some(place);
     }
 
-    /// Ends the order to leave, which was given in the previous view. Called when a view is adopted.
-    pub(crate) const fn end_order(&mut self) {
+    /// Ends the order to leave.
+    const fn end_order(&mut self) {
         self.ordered_at = None;
         self.passed = [false; 2];
+    }
+
+    /// Ends the orders of the previous view. A spare that it called is now a member; the others send hellos soon.
+    ///
+    /// Returns true if this relay was called to join, as a spare.
+    pub(crate) const fn on_new_view(&mut self) -> bool {
+        let was_called = self.ordered_at.is_some() && !self.requested;
+        self.end_order();
+        self.heard_spare = None;
+        was_called
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
@@ -138,9 +151,10 @@ impl Leaving {
 
     /// Returns the spare (relay that waits outside) that this relay has recently received; 0 for none.
     fn spare(&self, now: Instant, settings: &Settings) -> u16 {
+        // A spare that receives no answer sends its next hellos after `dead_after`.
         let known = self
             .heard_spare
-            .filter(|(_, at)| now.since(*at) < settings.dead_after);
+            .filter(|(_, at)| now.since(*at) < settings.dead_after.times(2));
         known.map_or(0, |(node, _)| node)
     }
 
@@ -162,19 +176,7 @@ impl Leaving {
 impl Layers {
     /// Returns the reason why this relay cannot leave the chain now; `None` if it can leave.
     fn departure_refusal(&self, now: Instant, member: &Member) -> Option<Departure> {
-        let Member {
-            node,
-            mission,
-            settings,
-            view,
-            ..
-        } = member;
-        let relays = u32::from(mission.relays());
-        let proposer = match *view {
-            ViewId::LOADED => mission.leader(),
-            view => view.proposer(),
-        };
-        let weight = 2 * relays.saturating_sub(1) + u32::from(proposer != *node);
+        let Member { node, settings, .. } = member;
         let [before, after] =
             [Side::Upstream, Side::Downstream].map(|side| self.neighbours.at(side).node());
         // A spare between this relay and a neighbour joins first.
@@ -189,7 +191,7 @@ impl Layers {
             Some(Departure::NeedsChannel)
         } else if settings.guard.is_none() && !settings.leave_without_guard {
             Some(Departure::NeedsGuard)
-        } else if relays < 2 || settings.quorum && weight <= relays {
+        } else if !member.keeps_quorum_without(*node) {
             Some(Departure::NeedsQuorum)
         } else if before != 0 && after != 0 && width > CANDIDATES {
             Some(Departure::WideGap)
@@ -210,7 +212,12 @@ impl Layers {
         } = self.leaving;
         // 0 is the mark of the relay that has the order to leave.
         let endurance_s = lasts_until.map_or(u16::MAX, |at| (tenths(at.since(now)) / 10).max(1));
-        let leaves = requested && self.departure_refusal(now, member).is_none();
+        let leaves = requested
+            && match self.departure_refusal(now, member) {
+                // Once a spare has joined, the others have a quorum.
+                Some(Departure::NeedsQuorum) => self.lease.knows_spare(),
+                refused => refused.is_none(),
+            };
         let ordered = self.lease.orders().leaver == member.node;
         let requests = Requests {
             leaver: if leaves { member.node } else { 0 },
@@ -553,6 +560,14 @@ impl Node {
                     || now.since(called_at) >= settings.dead_after
                 {
                     self.come_back(now);
+                    self.layers.leaving.ordered_at = Some(called_at);
+                    if hello.neighbour == 0 {
+                        // The caller is an end of the chain, so this relay is the next end and searches for nobody beyond.
+                        self.layers
+                            .neighbours
+                            .at_mut(side.other())
+                            .give_up(now, true);
+                    }
                 }
             }
             return true;

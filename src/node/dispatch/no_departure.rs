@@ -33,7 +33,9 @@ impl Leaving {
 
     pub(crate) const fn record_place(self, _: Placement) {}
 
-    pub(crate) const fn end_order(self) {}
+    pub(crate) const fn on_new_view(self) -> bool {
+        false
+    }
 
     pub(crate) const fn next_timeout(self) -> Option<Instant> {
         None

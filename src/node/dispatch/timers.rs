@@ -82,6 +82,10 @@ impl Node {
         let (solving, searches) = (self.is_solving(now), self.searches());
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
+        if layers.leaving.is_outside() {
+            // On a channel that loses frames, only frequent hellos keep the members informed of this relay.
+            neighbour.record_unselected(now, settings);
+        }
         if solving && neighbour.excuse_silence(now, settings) {
             return;
         }

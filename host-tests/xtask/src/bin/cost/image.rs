@@ -130,7 +130,7 @@ const IMAGES: &[Image] = &[
         // - both directions by the joint method: 11 KiB flash, 1.6 KiB RAM, 0.5 KiB stack
         // - exact hops of both directions with interference along x: 1.5 KiB
         // - fitted slots: 5 KiB flash, 104 bytes RAM
-        // - departures, spares, and motions that begin and end together: 6.5 KiB flash, 280 bytes RAM
+        // - departures, spares, and motions that begin and end together: 6.75 KiB flash, 280 bytes RAM
         // - endurance: 4 KiB flash of this image, 1 KiB of the others with an autopilot; 180 bytes RAM
         // - states of refused setpoints and of nodes with another mission or key in reports: 1 KiB
         [242 * 1024 + 256, 16_640, 7_168],
