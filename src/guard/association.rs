@@ -13,7 +13,7 @@ use crate::side::Side;
 use crate::time::Jitter;
 
 /// Number of consecutive messages of an unknown session that prove a restart of the neighbour. Fewer such messages are
-/// possibly late messages of an earlier association (session).
+/// possibly late messages of an earlier association.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of seconds after which a neighbour's halt request expires if it is not repeated.
@@ -22,7 +22,7 @@ const HALT_REMINDERS: u8 = 15;
 /// Number of seconds after which a neighbour's last reported x expires without a new message.
 const SEEN_REMINDERS: u8 = 15;
 
-/// Notice to a neighbour that this relay has left the association (session) with it. This relay leaves the association
+/// Notice to a neighbour that this relay has left the association with it. This relay leaves the association
 /// because its drone no longer flies to setpoints. The notice is repeated until the neighbour starts a new association.
 #[derive(Clone, Copy, Debug)]
 struct LeaveNotice {
@@ -31,7 +31,7 @@ struct LeaveNotice {
     due: bool,
 }
 
-/// State of the association (session) with the neighbour on one side. The state has the numbers of the session, and
+/// State of the association with the neighbour on one side. The state has the numbers of the session, and
 /// the pending messages and requests.
 #[expect(
     clippy::struct_excessive_bools,
@@ -41,13 +41,13 @@ struct LeaveNotice {
 pub(super) struct Association {
     /// Node number of the neighbour in this association; 0 if there is no neighbour.
     pub(super) node: u16,
-    /// Random number by which this relay identifies the association (session) with the neighbour.
+    /// Random number by which this relay identifies the association with the neighbour.
     pub(super) own_number: u16,
-    /// Number by which the neighbour identifies this association (session); 0 until it is known.
+    /// Number by which the neighbour identifies this association; 0 until it is known.
     pub(super) peer_number: u16,
-    /// Number of consecutive messages of the neighbour that belong to no current association (session).
+    /// Number of consecutive messages of the neighbour that belong to no current association.
     foreign_messages: u8,
-    /// True if a message about the fence (limit of x between two relays) to the neighbour is due.
+    /// True if a message about the fence to the neighbour is due.
     pub(super) due: bool,
     /// True while the neighbour requests an open chain. In an open chain all relays are at least the minimum separation
     /// apart along x.
@@ -59,13 +59,13 @@ pub(super) struct Association {
     halt_reminders_left: u8,
     /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
-    /// Number of the association (session) that the neighbour has left; 0 if it has left none. A neighbour that has
+    /// Number of the association that the neighbour has left; 0 if it has left none. A neighbour that has
     /// left counts as absent, because its drone does not fly to setpoints.
     left_number: u16,
-    /// Notice to the neighbour that this relay has left an association (session) with it. `None` if the neighbour
+    /// Notice to the neighbour that this relay has left an association with it. `None` if the neighbour
     /// needs no notice.
     leave_notice: Option<LeaveNotice>,
-    /// Last x received from the neighbour, m, in any association (session); NaN if none has been received.
+    /// Last x received from the neighbour, m, in any association; NaN if none has been received.
     seen_m: f32,
     /// Number of seconds (reminders) until the neighbour's last x expires.
     seen_reminders_left: u8,
@@ -115,7 +115,7 @@ impl Association {
     }
 
     /// Returns the neighbour's last reported x, m; NaN if it is unknown or expired.
-    pub(super) const fn seen_m(&self) -> f32 {
+    pub(super) const fn recent_x_m(&self) -> f32 {
         if self.seen_reminders_left == 0 {
             f32::NAN
         } else {
@@ -135,11 +135,11 @@ impl Association {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
 
-    /// Returns the reason why the neighbour at `side`, without an association (session), stops this relay.
+    /// Returns the reason why the neighbour at `side`, without an association, stops this relay.
     ///
     /// It is `Lost` if the neighbour is not linked because of a lost drone in `keep_out`, otherwise `Unheard`.
     pub(super) fn unpaired_reason(&self, side: Side, keep_out: &KeepOut, own: &Own) -> HoldReason {
-        if keep_out.bars(side, self.node, self.seen_m(), &own.config) {
+        if keep_out.bars(side, self.node, self.recent_x_m(), &own.config) {
             HoldReason::Lost
         } else {
             HoldReason::Unheard
@@ -147,7 +147,7 @@ impl Association {
     }
 
     /// Returns the x of the neighbour's last message with its x, m; NaN without such a message.
-    pub(super) const fn last_m(&self) -> f32 {
+    pub(super) const fn last_x_m(&self) -> f32 {
         self.seen_m
     }
 
@@ -155,13 +155,13 @@ impl Association {
         self.left_number != 0
     }
 
-    /// Marks the neighbour as absent: it has left the association (session) with the number `association`. An absent
+    /// Marks the neighbour as absent: it has left the association with the number `association`. An absent
     /// neighbour may be anywhere.
     pub(super) const fn mark_absent(&mut self, association: u16) {
         self.left_number = association;
     }
 
-    /// Accepts the number that the neighbour has given to the association (session) with this relay. If the neighbour
+    /// Accepts the number that the neighbour has given to the association with this relay. If the neighbour
     /// had left, it counts as present again.
     pub(super) const fn pair(&mut self, association: u16) {
         self.peer_number = association;
@@ -169,12 +169,12 @@ impl Association {
     }
 
     /// Returns true if the message `fence` states that the neighbour has left the current association. Later
-    /// repetitions of the message do not count, because this relay then has a new association (session).
+    /// repetitions of the message do not count, because this relay then has a new association.
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
 
-    /// Returns a new association (session) with the same neighbour, after this relay has left `self`. If the neighbour
+    /// Returns a new association with the same neighbour, after this relay has left `self`. If the neighbour
     /// has sent a number for `self`, it still relies on `self`. The new association then includes a leave notice.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
@@ -192,7 +192,7 @@ impl Association {
         }
     }
 
-    /// Returns a new association (session) with the same neighbour. A pending leave notice is kept.
+    /// Returns a new association with the same neighbour. A pending leave notice is kept.
     pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
         Self {
             leave_notice: self.leave_notice,
@@ -200,7 +200,7 @@ impl Association {
         }
     }
 
-    /// Returns true if `fence` belongs to an association (session) that this relay or its neighbour left. If the
+    /// Returns true if `fence` belongs to an association that this relay or its neighbour left. If the
     /// neighbour still uses an association that this relay has left, the leave notice is repeated.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
@@ -228,7 +228,7 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the notice that this relay has left the association (session) with its neighbour. `None` if no notice
+    /// Returns the notice that this relay has left the association with its neighbour. `None` if no notice
     /// must be sent.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
@@ -246,7 +246,7 @@ impl Association {
         known
     }
 
-    /// Returns a message to the neighbour about the fence (plane x = constant between the two relays). The caller fills
+    /// Returns a message to the neighbour about the fence. The caller fills
     /// in the fence's number, its x, and the upstream relay's distance from it. These are 0 in the result.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
@@ -316,7 +316,7 @@ impl Association {
     /// message is pending.
     ///
     /// The message contains the relay's reported position, and a halt request if one must be forwarded. The message is
-    /// valid without an association (session).
+    /// valid without an association.
     pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.leave_notice.is_none();
         let place = own.reported.filter(|_| is_due)?;
@@ -329,7 +329,7 @@ impl Association {
         })
     }
 
-    /// Counts a message that does not belong to this association (session). Returns true once [`MAX_FOREIGN_MESSAGES`]
+    /// Counts a message that does not belong to this association. Returns true once [`MAX_FOREIGN_MESSAGES`]
     /// such messages were received in a row: the neighbour must have restarted.
     pub(super) const fn count_foreign(&mut self) -> bool {
         self.foreign_messages = self.foreign_messages.saturating_add(1);
@@ -451,7 +451,7 @@ impl KeepOut {
     }
 
     /// Stores the position of a neighbour that reports that its drone does not fly to setpoints. A report that belongs
-    /// to the current association (session) is ignored: it is late, because the drone flies to setpoints again.
+    /// to the current association is ignored: it is late, because the drone flies to setpoints again.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.peer_number;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
@@ -484,7 +484,7 @@ impl KeepOut {
     /// Returns true if a drone not flying to setpoints blocks this relay's way to its agreed position. The way begins
     /// at the relay's setpoint.
     pub(super) fn blocks(&self, own: &Own) -> bool {
-        let ways = own.setpoint.zip(own.target);
+        let ways = own.setpoint.zip(own.goal);
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
@@ -593,9 +593,9 @@ impl KeepOut {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fence {
-    /// Number that the sender gave to its association (session) with this neighbour, never 0.
+    /// Number that the sender gave to its association with this neighbour, never 0.
     pub association: u16,
-    /// Number that the destination last sent for its association (session) with the sender, 0 for none.
+    /// Number that the destination last sent for its association with the sender, 0 for none.
     pub echo: u16,
     /// Number of the fence, the plane x = constant between the two relays; 0 if there is no fence yet. The relay
     /// upstream (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
@@ -603,7 +603,8 @@ pub struct Fence {
     /// Limit of x that the sender states, m, -1e7 to 1e7. The relay toward Tx states the x of its newest fence, or its
     /// own highest possible x before the first fence. The relay toward Rx states its lowest possible x.
     pub x_m: f32,
-    /// x of the position that the chain has agreed on for the sender, m: -1e7 to 1e7.
+    /// x of the position that the sender flies to, m: -1e7 to 1e7. It is the agreed position, or a point on the way
+    /// there.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, this is the lateral offset and altitude of its reported position.
@@ -626,13 +627,13 @@ impl Fence {
     /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies the flag `REQUESTS_OPENING`
     /// of the last message received from the destination to this flag.
     pub const OPENING_RECEIVED: u8 = 8;
-    /// Flag: the sender has left this association (session). The sender's drone does not fly to its setpoints, or did
+    /// Flag: the sender has left this association. The sender's drone does not fly to its setpoints, or did
     /// not do so for a time. The fence number is not valid. The position is valid only if the flag
     /// [`UNPLACED`](Self::UNPLACED) is set, too.
     pub const LEFT: u8 = 16;
     /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay farther away,
     /// is on the wrong side of a neighbour along x, or does not know its order with a neighbour. The request is
-    /// repeated every second, and is valid in any association (session).
+    /// repeated every second, and is valid in any association.
     pub const HALTS: u8 = 32;
     /// Flag: the position in this message shows the order of the two relays along x. It permits the receiver no move.
     /// The relay downstream sets the flag while its order with its own downstream neighbour is not confirmed. With

@@ -14,11 +14,11 @@ use crate::time::Jitter;
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Sequence number of the newest fence (limit of x) from the upstream neighbour; 0 for none yet.
+    /// Sequence number of the newest fence from the upstream neighbour; 0 for none yet.
     number: u16,
     /// Newest lower limit of this relay's x (fence), which the upstream neighbour has set, m.
     fence_m: f32,
-    /// Distance along x that the upstream neighbour requests to keep from its fence (limit of x), m. Infinite before
+    /// Distance along x that the upstream neighbour requests to keep from its fence, m. Infinite before
     /// its first request.
     requested_m: f32,
     /// Distance along x to the upstream neighbour that this relay has agreed to, m. Infinity, also the initial value,
@@ -29,7 +29,7 @@ pub(super) struct FenceFollower {
     /// Lateral offset and altitude of the upstream neighbour's setpoint.
     across: CrossSection,
     /// True once this relay's x is known to have reached a fence (lower limit) of the upstream neighbour.
-    clear: bool,
+    passed_first_fence: bool,
     /// True once the upstream neighbour has been told that this relay has reached the newest fence. The fence is the
     /// lower limit of this relay's x.
     owner_informed: bool,
@@ -46,7 +46,7 @@ impl FenceFollower {
             agreed_m: f32::INFINITY,
             target_m: 0.0,
             across: CrossSection::on_line(0.0),
-            clear: false,
+            passed_first_fence: false,
             owner_informed: false,
         }
     }
@@ -73,8 +73,8 @@ impl FenceFollower {
         }
     }
 
-    /// Starts a new association (session) with the upstream neighbour. The field `keep_out` keeps the lower limit of
-    /// this relay's x from the old association. If the neighbour had set no fence (limit of x) in it, the limit is the
+    /// Starts a new association with the upstream neighbour. The field `keep_out` keeps the lower limit of
+    /// this relay's x from the old association. If the neighbour had set no fence in it, the limit is the
     /// x of this relay's setpoint.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
@@ -90,7 +90,7 @@ impl FenceFollower {
                 keep_out.mark_near(limit_m + missing_m);
             } else if !self.has_fence() {
                 keep_out.mark_near(limit_m + separation_m);
-            } else if !self.clear {
+            } else if !self.passed_first_fence {
                 keep_out.mark_near(self.fence_m);
             }
         }
@@ -100,7 +100,7 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association (session), and schedules a notice of this to the upstream neighbour. This relay's drone
+    /// Leaves the association, and schedules a notice of this to the upstream neighbour. This relay's drone
     /// no longer flies to setpoints, so no limit of x applies to this relay.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
@@ -110,7 +110,7 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays on this side remain obstacles.
+    /// Starts a new association, because Tx or Rx has moved. Lost relays on this side remain obstacles.
     /// Drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
@@ -213,7 +213,7 @@ impl FenceFollower {
     /// Returns true if the upstream neighbour permits this relay to change its lateral offset and altitude. A lost
     /// relay that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
-        (self.association.has_no_flown_neighbour() || self.clear)
+        (self.association.has_no_flown_neighbour() || self.passed_first_fence)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
@@ -229,7 +229,7 @@ impl FenceFollower {
     /// The neighbour has announced a fence (lower limit of this relay's x), but no position report has shown this relay
     /// at or beyond a fence yet. So the two may be closer along x than the minimum separation.
     pub(super) const fn is_tight(&self) -> bool {
-        self.has_fence() && !self.clear
+        self.has_fence() && !self.passed_first_fence
     }
 
     /// Returns true if this relay's agreed x is less than the separation beyond its upstream neighbour's.
@@ -252,7 +252,7 @@ impl FenceFollower {
     /// minimum separation. The result is 0 while a lost relay may be closer than the separation, and until this relay
     /// has reached its first fence (lower limit of its x).
     pub(super) const fn kept_distance(&self) -> f32 {
-        if self.keep_out.is_near() || self.has_fence() && !self.clear {
+        if self.keep_out.is_near() || self.has_fence() && !self.passed_first_fence {
             0.0
         } else {
             self.agreed_m
@@ -278,7 +278,7 @@ impl FenceFollower {
             || !self.is_ordered() && self.association.is_on_wrong_side(own, Side::Upstream)
     }
 
-    /// Returns true if the upstream neighbour has announced a fence (limit of x) in this association.
+    /// Returns true if the upstream neighbour has announced a fence in this association.
     pub(super) const fn has_fence(&self) -> bool {
         self.number != 0
     }
@@ -288,7 +288,7 @@ impl FenceFollower {
     /// either. `low_m` is the lowest x of this relay and of the relays downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
-            self.clear |= own.reachable.low_m >= self.fence_m;
+            self.passed_first_fence |= own.reachable.low_m >= self.fence_m;
             self.association.due |= low_m >= self.fence_m && !self.owner_informed;
         }
     }
@@ -298,7 +298,7 @@ impl FenceFollower {
     /// The relays upstream may be closer than the separation until this relay has reached its first fence (lower limit
     /// of its x). After that they are all at a smaller x than this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
-        if self.has_fence() && !self.clear {
+        if self.has_fence() && !self.passed_first_fence {
             self.fence_m - self.requested_m.min(own.config.separation_m)
         } else {
             f32::NEG_INFINITY

@@ -110,7 +110,7 @@ use owner::FenceOwner;
 
 /// Guard (collision avoidance) of one relay: computes safe setpoints on the way to the agreed position.
 ///
-/// Call [`commit`](Self::commit), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`set_neighbour`](Self::set_neighbour) with new inputs.
+/// Call [`set_goal`](Self::set_goal), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`set_neighbour`](Self::set_neighbour) with new inputs.
 /// After each call [`steer`](Self::steer), fly to its result, then send the messages of [`poll`](Self::poll). Every call takes at
 /// most some hundred operations and two square roots, independent of the length of the chain.
 #[derive(Clone, Copy, Debug)]
@@ -166,19 +166,21 @@ impl Guard {
         }
     }
 
-    /// Sets the position that the chain has agreed on, limited to the geofence.
-    pub fn commit(&mut self, place: Placement) {
+    /// Sets the position to fly to, limited to the geofence.
+    ///
+    /// It is the agreed position, or a point on the way there.
+    pub fn set_goal(&mut self, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.own.target = Some(self.own.config.clamp(place));
+        self.own.goal = Some(self.own.config.clamp(place));
         self.follower.association.due = true;
         self.owner.association.due = true;
     }
 
     /// Returns true if `place`, limited to the geofence, equals the current agreed position.
     pub fn is_for(&self, place: Placement) -> bool {
-        self.own.target == Some(self.own.config.clamp(place))
+        self.own.goal == Some(self.own.config.clamp(place))
     }
 
     /// Handles a position report of the flight controller, measured at time `at`.
@@ -233,7 +235,7 @@ impl Guard {
         self.initial_place = None;
         (self.disorder, self.unordered) = (false, 0);
         self.own.reported = None;
-        self.own.target = None;
+        self.own.goal = None;
         self.own.release(self.started_at);
         self.follower.leave_line(&mut self.jitter);
         self.owner.leave_line(&mut self.jitter);
@@ -255,9 +257,9 @@ impl Guard {
         self.own.leaver
     }
 
-    /// Handles a message about a fence (limit of x) from node `from`, a neighbour at `side`.
+    /// Handles a message about a fence from node `from`, a neighbour at `side`.
     ///
-    /// A message with a value out of range is counted and ignored. A message of an earlier association (session), or of
+    /// A message with a value out of range is counted and ignored. A message of an earlier association, or of
     /// a node other than the neighbour, is ignored.
     pub fn handle_fence(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
@@ -319,7 +321,7 @@ impl Guard {
     /// `now` is the time at which the autopilot gets the setpoint. At most [`GuardConfig::lag`] later, the drone flies
     /// toward it.
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
-        let target = self.own.target?;
+        let target = self.own.goal?;
         let Some(before) = self.own.setpoint else {
             let found = self.initial_place?;
             let hovers = self.own.hovers(now);
@@ -337,9 +339,9 @@ impl Guard {
         let is_ordered = self.is_ordered();
         self.halt(is_ordered, now);
         let before = self.own.setpoint.unwrap_or(before);
-        let clear =
+        let may_cross =
             self.follower.may_move_across(&self.own) && self.owner.may_move_across(&self.own);
-        self.open(clear);
+        self.open(may_cross);
         let own = &self.own;
         let kept_m = self.follower.kept_distance();
         let apart = if own.open {
@@ -361,7 +363,7 @@ impl Guard {
         let x_m = x_m.max(least.min(before.x_m)).min(most.max(before.x_m));
         let moves = is_ordered && !own.halted;
         let x_m = if moves { x_m } else { before.x_m };
-        let across = if clear && moves { target } else { before };
+        let across = if may_cross && moves { target } else { before };
         // A relay outside of the geofence returns as far as its limits permit, and goes no farther out.
         let wanted = across.cross_section().at(x_m);
         let next = own.config.clamp_toward(wanted, before);
@@ -389,11 +391,11 @@ impl Guard {
     }
 
     /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. A request of one
-    /// neighbour is forwarded to the other neighbour. `clear` is true if both sides permit this relay to change its
+    /// neighbour is forwarded to the other neighbour. `may_cross` is true if both sides permit this relay to change its
     /// lateral offset and altitude.
-    fn open(&mut self, clear: bool) {
+    fn open(&mut self, may_cross: bool) {
         let own = &mut self.own;
-        let is_blocked = !clear && !own.has_agreed_cross_section();
+        let is_blocked = !may_cross && !own.has_agreed_cross_section();
         let close = self.follower.is_close(own) || self.owner.is_close(own);
         let tight = close && (self.follower.is_tight() || self.owner.is_tight());
         let needs = tight
@@ -419,7 +421,7 @@ impl Guard {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
             || self.owner.is_out_of_order(&self.own)
-            || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
+            || up.recent_x_m() - down.recent_x_m() > 2.0 * self.own.config.hover_m
     }
 
     /// Returns true if this relay is seen between its neighbours along x. Fences (limits of x) or reported positions
@@ -462,7 +464,7 @@ impl Guard {
                 return Some((side, association.node, fence));
             }
         }
-        if !self.flown || self.own.target.is_none() || !self.own.reachable.is_known() {
+        if !self.flown || self.own.goal.is_none() || !self.own.reachable.is_known() {
             self.forward_halt();
             let (up, down) = (&mut self.follower.association, &mut self.owner.association);
             let fence_message = [(Side::Upstream, up), (Side::Downstream, down)]
@@ -525,7 +527,7 @@ impl Guard {
     /// position, limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
-        match (own.target, own.setpoint) {
+        match (own.goal, own.setpoint) {
             (Some(target), Some(setpoint)) => {
                 !(own.open || own.halted)
                     && (target.x_m - setpoint.x_m).abs() <= own.config.rounding()
@@ -537,7 +539,7 @@ impl Guard {
         }
     }
 
-    /// Returns true unless the downstream neighbour still has to answer the newest fence (limit of x). It has to answer
+    /// Returns true unless the downstream neighbour still has to answer the newest fence. It has to answer
     /// none before its first message, and while it does not fly to setpoints.
     pub fn is_answered(&self) -> bool {
         self.owner.is_answered()
@@ -570,7 +572,7 @@ impl Guard {
             };
             return wrong.then_some(HoldReason::Order);
         }
-        own.target?;
+        own.goal?;
         let reason = match side {
             Side::Upstream => self.follower.hold_reason(own),
             Side::Downstream => self.owner.hold_reason(own, self.follower.kept_distance()),
@@ -606,7 +608,7 @@ impl Guard {
     /// `NotFlown` if the neighbour does not fly to setpoints, otherwise `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
-        let (clear, keep_out, association) = match side {
+        let (may_cross, keep_out, association) = match side {
             Side::Upstream => (
                 self.follower.may_move_across(own),
                 &self.follower.keep_out,
@@ -618,7 +620,7 @@ impl Guard {
                 &self.owner.association,
             ),
         };
-        let is_held_up = own.is_held_up(side, clear);
+        let is_held_up = own.is_held_up(side, may_cross);
         is_held_up.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 

@@ -140,8 +140,9 @@ pub(super) struct Own {
     pub(super) node: u16,
     /// Number of the relay with the order to leave the chain, 0 for none. That relay holds its position.
     pub(super) leaver: u16,
-    /// Agreed position, inside the geofence; `None` before the first agreement.
-    pub(super) target: Option<Placement>,
+    /// Position to fly to now, inside the geofence: the agreed position, or a point on the way there. `None` before the
+    /// first agreement.
+    pub(super) goal: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
     /// Time of the last change of the setpoint's lateral offset or altitude.
@@ -170,7 +171,7 @@ impl Own {
             config,
             node,
             leaver: 0,
-            target: None,
+            goal: None,
             setpoint: None,
             reachable: ReachableInterval::unknown(now),
             cross_section_changed_at: now,
@@ -218,16 +219,17 @@ impl Own {
     /// Returns true if the setpoint has not moved for five seconds, possibly because of one neighbour.
     ///
     /// The neighbour at `side` can be the cause if the agreed position is farther toward `side`. It also can be the
-    /// cause if its side forbids a needed change of lateral offset or altitude (`clear` is false).
-    pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
-        let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
+    /// cause if its side forbids a needed change of lateral offset or altitude (`may_cross` is false).
+    pub(super) fn is_held_up(&self, side: Side, may_cross: bool) -> bool {
+        let Some((setpoint, target)) = self.setpoint.zip(self.goal) else {
             return false;
         };
         let ahead_m = match side {
             Side::Upstream => setpoint.x_m - target.x_m,
             Side::Downstream => target.x_m - setpoint.x_m,
         };
-        let moves = ahead_m > self.config.rounding() || !clear && !self.has_agreed_cross_section();
+        let moves =
+            ahead_m > self.config.rounding() || !may_cross && !self.has_agreed_cross_section();
         self.reminders >= MAX_REMINDERS_STILL && moves
     }
 
@@ -325,12 +327,12 @@ impl Own {
     /// Returns true if the setpoint has the agreed lateral offset and altitude.
     #[inline(never)] // called from several places
     pub(super) fn has_agreed_cross_section(&self) -> bool {
-        self.target
+        self.goal
             .is_none_or(|target| target.cross_section() == self.cross_section())
     }
 
     pub(super) fn target_m(&self) -> f32 {
-        self.target.unwrap_or_default().x_m
+        self.goal.unwrap_or_default().x_m
     }
 
     pub(super) fn goal_m(&self) -> f32 {

@@ -15,12 +15,12 @@ use crate::time::Jitter;
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Sequence number of the newest fence (limit of x) sent to the downstream neighbour; 0 for none.
+    /// Sequence number of the newest fence sent to the downstream neighbour; 0 for none.
     number: u16,
     /// Newest lower limit of the downstream neighbour's x (fence), which this relay has set, m. Infinite before the
     /// first.
     fence_m: f32,
-    /// Distance along x that this relay requests to keep from its fence (limit of x), m. Infinite before its first
+    /// Distance along x that this relay requests to keep from its fence, m. Infinite before its first
     /// request.
     requested_m: f32,
     /// Distance along x to keep now to the downstream neighbour, m. Infinity stands for the minimum separation. The
@@ -37,7 +37,7 @@ pub(super) struct FenceOwner {
     /// True if the downstream neighbour has received the newest fence, the lower limit of its x.
     is_acknowledged: bool,
     /// True once the downstream neighbour has reported that it has reached a fence (lower limit of its x).
-    clear: bool,
+    passed_first_fence: bool,
 }
 
 impl FenceOwner {
@@ -54,7 +54,7 @@ impl FenceOwner {
             across: CrossSection::on_line(0.0),
             arrived: false,
             is_acknowledged: false,
-            clear: false,
+            passed_first_fence: false,
         }
     }
 
@@ -74,13 +74,13 @@ impl FenceOwner {
     /// to its agreed position, but not before the last fence that it has passed.
     fn record_lost_x(&mut self) {
         if !self.association.has_no_flown_neighbour() && self.follower_low_m.is_finite() {
-            let last_m = self.association.last_m().min(self.target_m);
+            let last_m = self.association.last_x_m().min(self.target_m);
             let (node, x_m) = (self.association.node, last_m.max(self.follower_low_m));
             self.keep_out.record_lost_x(Side::Downstream, node, x_m);
         }
     }
 
-    /// Starts a new association (session) with the downstream neighbour. The field `keep_out` keeps the upper limit of
+    /// Starts a new association with the downstream neighbour. The field `keep_out` keeps the upper limit of
     /// this relay's x from the old association. If the neighbour was not known to be at a larger x, the limit is the x
     /// of this relay's setpoint.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
@@ -90,7 +90,7 @@ impl FenceOwner {
             keep_out.add_lost(Side::Downstream, self.association.node, limit_m);
             if !self.is_ordered(own) {
                 keep_out.mark_near(limit_m - own.config.separation_m);
-            } else if self.has_reduced_step(own) || !self.clear {
+            } else if self.has_reduced_step(own) || !self.passed_first_fence {
                 keep_out.mark_near(limit_m);
             }
         }
@@ -100,7 +100,7 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association (session), and schedules a notice of this to the downstream neighbour. This relay's drone
+    /// Leaves the association, and schedules a notice of this to the downstream neighbour. This relay's drone
     /// no longer flies to setpoints, so no limit of x applies to this relay.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
@@ -110,7 +110,7 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association (session), because Tx or Rx has moved. Lost relays on this side remain obstacles.
+    /// Starts a new association, because Tx or Rx has moved. Lost relays on this side remain obstacles.
     /// Drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
@@ -148,7 +148,7 @@ impl FenceOwner {
 
     /// Returns true if the downstream neighbour was last reported at a smaller x, the wrong order.
     ///
-    /// Reports outside of an association (session) count, too. Also true while a lost relay downstream may be at a
+    /// Reports outside of an association count, too. Also true while a lost relay downstream may be at a
     /// smaller x.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
@@ -162,7 +162,7 @@ impl FenceOwner {
 
     /// Returns true if the downstream neighbour is known to be at a larger x than this relay.
     ///
-    /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence (limit of x), two
+    /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence, two
     /// relays can be closer along x than these errors. They then count as in order only if lateral offset and altitude
     /// keep them at least the separation apart.
     ///
@@ -171,7 +171,7 @@ impl FenceOwner {
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
-        let least_m = match (self.clear, may_pass) {
+        let least_m = match (self.passed_first_fence, may_pass) {
             (true, _) => -2.0 * off_m - own.config.rounding(),
             (false, true) => -off_m - own.config.rounding(),
             (false, false) => off_m,
@@ -203,7 +203,7 @@ impl FenceOwner {
     /// a lost relay may be closer than the separation, and until the neighbour has reached its first fence (lower limit
     /// of its x). `kept_m` is the distance that this relay and its upstream neighbour surely keep, m.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
-        let is_open = self.association.has_no_flown_neighbour() || self.clear;
+        let is_open = self.association.has_no_flown_neighbour() || self.passed_first_fence;
         if self.keep_out.is_near() || !is_open {
             0.0
         } else {
@@ -270,7 +270,7 @@ impl FenceOwner {
         self.is_acknowledged = fence.number == self.number;
         if self.is_acknowledged {
             self.follower_low_m = self.follower_low_m.max(fence.x_m.min(self.fence_m));
-            self.clear |= self.number != 0 && fence.x_m >= self.fence_m;
+            self.passed_first_fence |= self.number != 0 && fence.x_m >= self.fence_m;
             if self.arrived && fence.has_flag(Fence::AGREES) {
                 let least_m = own.config.least_step(own.cross_section(), fence.across);
                 self.agreed_m = self.agreed_m.min(self.requested_m.max(least_m));
@@ -299,7 +299,7 @@ impl FenceOwner {
     /// Returns true if the downstream neighbour permits this relay to change lateral offset and altitude. A lost relay
     /// that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
-        (self.association.has_no_flown_neighbour() || self.clear)
+        (self.association.has_no_flown_neighbour() || self.passed_first_fence)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
@@ -309,7 +309,7 @@ impl FenceOwner {
     /// The neighbour has answered, but has not reported yet that it has reached a fence (lower limit of its x). So the
     /// two may be closer along x than the minimum separation.
     pub(super) const fn is_tight(&self) -> bool {
-        self.has_reply() && !self.clear
+        self.has_reply() && !self.passed_first_fence
     }
 
     /// Returns true if the downstream neighbour's agreed x is less than the separation beyond this relay's.
@@ -319,12 +319,12 @@ impl FenceOwner {
         place.is_some_and(|place| own.is_close(place.x_m - own.target_m()))
     }
 
-    /// Returns true if the downstream neighbour is known to be beyond the newest fence (limit of x).
+    /// Returns true if the downstream neighbour is known to be beyond the newest fence.
     pub(super) fn is_cleared(&self) -> bool {
-        self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
+        self.passed_first_fence && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns true unless the downstream neighbour still has to answer the newest fence (limit of x). It has to answer
+    /// Returns true unless the downstream neighbour still has to answer the newest fence. It has to answer
     /// none before its first message, and while it does not fly to setpoints.
     pub(super) fn is_answered(&self) -> bool {
         let cannot = !self.has_reply() || self.association.has_no_flown_neighbour();
@@ -338,7 +338,7 @@ impl FenceOwner {
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
-        let settled = self.clear
+        let settled = self.passed_first_fence
             && self.arrived
             && own.arrived
             && own.has_agreed_cross_section()
@@ -371,7 +371,7 @@ impl FenceOwner {
         };
         let nearest = own.reachable.high_m + self.step(own, kept_m).max(step_m);
         let nearest = nearest.max(upstream_m + own.config.separation_m);
-        if !self.clear {
+        if !self.passed_first_fence {
             return Some((nearest, step_m, true));
         }
         let other_m = own.goal_of(self.association.node, self.target_m);
@@ -386,7 +386,7 @@ impl FenceOwner {
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
-    /// Schedules a message if the fence (limit of x) for the downstream neighbour needs another x. If the new x is
+    /// Schedules a message if the fence for the downstream neighbour needs another x. If the new x is
     /// final, the message is due at once. Otherwise it is due once this relay has arrived at its setpoint's x, because
     /// the fence can then be set to a lower x.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {

@@ -245,10 +245,10 @@ impl Lease {
     /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
     /// it joins first, unless the view already has more relays than before the request to leave.
     ///
-    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration of
-    /// a motion, counted from the first agreement in this view, or from the last time that all were in place. A relay waits for its order to leave
-    /// at most this maximum duration, and at most its remaining endurance. So at least half of the endurance at the
-    /// first request remains.
+    /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration
+    /// of a motion, counted from the first agreement in this view, or from the last time that all were in place. A
+    /// relay waits for its order to leave at most this maximum duration, and at most its remaining endurance. So at
+    /// least half of the endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -291,8 +291,8 @@ impl Lease {
         orders
     }
 
-    /// Records that this leader has joined a view of `relays` relays as the spare for a departure. Then no second spare is
-    /// called for it.
+    /// Records that this leader has joined a view of `relays` relays as the spare for a departure. Then no second spare
+    /// is called for it.
     pub(crate) fn exclude_joined(&mut self, relays: u16) {
         if let Some(known) = self.departures.first_mut() {
             known.complement = relays.saturating_sub(1);
@@ -326,7 +326,7 @@ impl Lease {
     /// Returns the silence after which a neighbour may count as lost.
     ///
     /// It is the lease duration of the last renewal or `dead_after`, whichever is longer.
-    pub(crate) fn span(&self, settings: &Settings) -> Duration {
+    pub(crate) fn silence_until_lost(&self, settings: &Settings) -> Duration {
         let span = self.current.map_or(0, |current| current.span);
         from_tenths(span).max(settings.dead_after)
     }
@@ -667,8 +667,8 @@ mod tests {
         assert_eq!(span_after(2), 150);
     }
 
-    /// Returns the times, s, at which the leader's orders state that some relay is not in place. The leader agrees at 0 s,
-    /// and every 5 s, until 300 s, gives orders after a renewal that reports `is_in_place(time)`.
+    /// Returns the times, s, at which the leader's orders state that some relay is not in place. The leader agrees at 0
+    /// s, and every 5 s, until 300 s, gives orders after a renewal that reports `is_in_place(time)`.
     #[cfg(feature = "departures")]
     fn not_in_place(respacing_s: u64, is_in_place: impl Fn(u64) -> bool) -> Vec<u64> {
         let settings = Settings {

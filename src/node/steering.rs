@@ -22,7 +22,7 @@ pub(crate) struct Steering {
     /// no setpoint.
     reported_setpoint: Option<Placement>,
     /// Stepwise motion to a new agreed position; the array is empty without the feature `departures`.
-    way: [Way; DEPARTURES as usize],
+    respacing: [Respacing; DEPARTURES as usize],
 }
 
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
@@ -51,19 +51,19 @@ pub(crate) enum Begin {
 /// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that
 /// they arrive together.
 #[derive(Clone, Copy, Debug)]
-struct Way {
-    /// Agreed position at the last call of `advance`. The next field, `wanted`, is the position to fly to now: it
+struct Respacing {
+    /// Agreed position at the last call of `advance`. The next field, `waypoint`, is the position to fly to now: it
     /// approaches the agreed position in steps.
     agreed: Option<Placement>,
-    wanted: Option<Placement>,
+    waypoint: Option<Placement>,
     /// Motion to the agreed position; `None` once the position to fly to has reached the agreed position.
     motion: Option<Motion>,
 }
 
-impl Way {
+impl Respacing {
     const NONE: Self = Self {
         agreed: None,
-        wanted: None,
+        waypoint: None,
         motion: None,
     };
 
@@ -87,11 +87,11 @@ impl Way {
         }
         self.step(now);
         if agreed == self.agreed {
-            return self.wanted;
+            return self.waypoint;
         }
         self.agreed = agreed;
-        if span == Duration::from_micros(0) || agreed.is_none() || self.wanted.is_none() {
-            (self.motion, self.wanted) = (None, agreed);
+        if span == Duration::from_micros(0) || agreed.is_none() || self.waypoint.is_none() {
+            (self.motion, self.waypoint) = (None, agreed);
         } else if self.motion.is_none() {
             let (since, waits) = match begin {
                 Begin::At(_) => (now, false),
@@ -107,12 +107,12 @@ impl Way {
         }
         // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
         self.step(now);
-        self.wanted
+        self.waypoint
     }
 
     /// Moves the position to fly to. It makes all steps of the current motion that are due at `now`.
     fn step(&mut self, now: Instant) {
-        let (Some(motion), Some(from), Some(to)) = (&mut self.motion, self.wanted, self.agreed)
+        let (Some(motion), Some(from), Some(to)) = (&mut self.motion, self.waypoint, self.agreed)
         else {
             return;
         };
@@ -125,7 +125,7 @@ impl Way {
             .ok()
             .filter(|steps| *steps >> STEPS == 0)
         else {
-            (self.motion, self.wanted) = (None, Some(to));
+            (self.motion, self.waypoint) = (None, Some(to));
             return;
         };
         let each = Duration::from_micros((motion.span.as_micros() >> STEPS).max(1));
@@ -137,7 +137,7 @@ impl Way {
         let part = (done - motion.done) / (1.0 - motion.done);
         motion.done = done;
         let between = |from: f32, to: f32| from + (to - from) * part;
-        self.wanted = Some(Placement {
+        self.waypoint = Some(Placement {
             x_m: between(from.x_m, to.x_m),
             y_m: between(from.y_m, to.y_m),
             altitude_m: between(from.altitude_m, to.altitude_m),
@@ -151,7 +151,7 @@ impl Steering {
         guard: None,
         remind_at: None,
         reported_setpoint: None,
-        way: [Way::NONE; DEPARTURES as usize],
+        respacing: [Respacing::NONE; DEPARTURES as usize],
     };
 
     /// Creates the guard (collision avoidance), if `settings` request a guard. `neighbours` are the node numbers of
@@ -186,23 +186,23 @@ impl Steering {
         span: Duration,
         begin: Begin,
     ) -> bool {
-        let agreed = match self.way.first_mut() {
-            Some(way) => way.advance(now, agreed, span, begin),
+        let waypoint = match self.respacing.first_mut() {
+            Some(respacing) => respacing.advance(now, agreed, span, begin),
             None => agreed,
         };
-        if let Some(agreed) = agreed
+        if let Some(waypoint) = waypoint
             && let Some(guard) = self.guard()
         {
-            let known = guard.is_for(agreed);
+            let known = guard.is_for(waypoint);
             if !known {
-                guard.commit(agreed);
+                guard.set_goal(waypoint);
             }
             guard.steer(now);
             if !known {
                 self.remind_at = Some(now + REMINDER);
             }
         }
-        let setpoint = self.setpoint(agreed);
+        let setpoint = self.setpoint(waypoint);
         let changed = setpoint != self.reported_setpoint;
         self.reported_setpoint = setpoint;
         changed
@@ -210,19 +210,19 @@ impl Steering {
 
     /// Returns true while the setpoint moves to a new agreed position.
     pub(crate) fn is_moving(&self) -> bool {
-        matches!(&self.way[..], [way] if way.motion.is_some())
+        matches!(&self.respacing[..], [respacing] if respacing.motion.is_some())
     }
 
     /// Returns the point that the motion to the agreed position has reached, before the guard limits it. `None` until
     /// the chain has agreed on positions.
-    pub(crate) fn stopped(&self) -> Option<Placement> {
-        self.way.first()?.wanted
+    pub(crate) fn waypoint(&self) -> Option<Placement> {
+        self.respacing.first()?.waypoint
     }
 
     pub(crate) fn setpoint(&self, agreed: Option<Placement>) -> Option<Placement> {
         match &self.guard {
             Some(guard) if GUARD => guard.setpoint(),
-            _ if self.is_moving() => self.stopped(),
+            _ if self.is_moving() => self.waypoint(),
             _ => agreed,
         }
     }
@@ -264,10 +264,10 @@ impl Steering {
     ///
     /// No effect if the neighbour toward Rx has answered the newest fence.
     pub(crate) fn repeat_fence(&mut self) {
-        if let Some(wanted) = self.stopped()
+        if let Some(waypoint) = self.waypoint()
             && let Some(guard) = self.guard().filter(|guard| !guard.is_answered())
         {
-            guard.commit(wanted);
+            guard.set_goal(waypoint);
         }
     }
 
@@ -332,7 +332,7 @@ impl Steering {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        match self.way.first() {
+        match self.respacing.first() {
             Some(way) => earliest(self.remind_at, way.motion.map(|motion| motion.at)),
             None => self.remind_at,
         }

@@ -13,8 +13,8 @@ use crate::time::{Duration, Instant};
 
 /// Age from which the last endurance value counts as too old.
 const STALE: Duration = Duration::from_millis(10_000);
-/// Maximum time between two comparisons of the margin with its limit. The margin is the drone's remaining flight time minus the time of the
-/// way home.
+/// Maximum time between two comparisons of the margin with its limit. The margin is the drone's remaining flight time
+/// minus the time of the way home.
 const REVIEW: Duration = Duration::from_millis(1_000);
 /// Time for which a condition of the endurance must hold before the relay acts on it.
 const HOLD: Duration = Duration::from_millis(15_000);
@@ -38,6 +38,20 @@ const APART: Duration = Duration::from_millis(10_000);
 /// Maximum valid flight time and way home, s. A larger value counts as unknown, because no multicopter flies longer.
 const MAX_S: f32 = 21_600.0;
 
+/// Condition: a request to leave has to be made or withdrawn. The conditions are indices of [`Endurance::since`].
+const CHANGE: usize = 0;
+/// Condition: the margin is at or below the floor, where `AtReserve` is raised.
+const AT_FLOOR: usize = 1;
+/// Condition: the leader has to receive a changed request.
+const MOVED: usize = 2;
+/// Condition: the margin is at least [`STEP`] above the floor.
+const RESTORED: usize = 3;
+
+/// Event `EnduranceUnknown`, as an index of [`Endurance::raised_at`].
+const UNKNOWN: usize = 0;
+/// Event `AtReserve`, as an index of [`Endurance::raised_at`].
+const RESERVE: usize = 1;
+
 #[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Endurance {
@@ -59,9 +73,7 @@ pub(super) struct Endurance {
     /// Margin below which the relay requests to leave, as `Relay::stay` has set it. `None` for the usual limit. The
     /// margin is the remaining flight time minus the time of the way home.
     limit: Option<Instant>,
-    /// Start times of four conditions; 0 for a condition that does not hold. In order: a request to leave has to be
-    /// made or withdrawn; the margin is at or below the floor (where `AtReserve` is raised); the leader has to receive
-    /// a changed request; the margin is at least [`STEP`] above the floor.
+    /// Start times of the four conditions [`CHANGE`] to [`RESTORED`]; 0 for a condition that does not hold.
     since: [Instant; 4],
     /// True if the relay itself has requested to leave, because of its endurance. False if the firmware has made the
     /// request.
@@ -118,7 +130,7 @@ impl Endurance {
             bump(&mut self.losses);
         }
         if self.reserve.is_some() {
-            self.raise(now, node, 0, Event::EnduranceUnknown);
+            self.raise(now, node, UNKNOWN, Event::EnduranceUnknown);
         }
     }
 
@@ -162,7 +174,7 @@ impl Endurance {
             return;
         };
         self.reviewed_at = now;
-        let leaves = node.leaves().is_some();
+        let leaves = node.departure_granted().is_some();
         let changes = if leaves {
             self.is_own && margin >= limit + STEP
         } else {
@@ -171,27 +183,28 @@ impl Endurance {
         // Pilots of a fleet of equal endurance are told one by one, in the leader's order, also if it is slow or refuses all.
         let (number, all) = (node.member().node, node.member().all);
         let each = Self::replacement(&settings).as_micros() / u64::from(all.max(1));
-        let each = if node.is_refused(now) {
+        let each = if node.can_never_leave(now) {
             Duration::from_micros(each)
         } else {
             Duration::from_micros(each / 2).min(APART)
         };
         let floor = Instant::ZERO + reserve + each.times(all.saturating_sub(number).into());
-        let is_restored = self.holds(now, 3, margin >= floor + STEP, false);
-        self.is_spent = self.holds(now, 1, margin <= floor, true) || self.is_spent && !is_restored;
+        let is_restored = self.holds(now, RESTORED, margin >= floor + STEP, false);
+        self.is_spent =
+            self.holds(now, AT_FLOOR, margin <= floor, true) || self.is_spent && !is_restored;
         self.keeps_out &= leaves && !is_restored;
-        node.set_spent(self.is_spent || self.keeps_out);
+        node.set_too_low(self.is_spent || self.keeps_out);
         if self.is_spent {
-            self.raise(now, node, 1, Event::AtReserve);
+            self.raise(now, node, RESERVE, Event::AtReserve);
         }
         // The leader's order is due before the reserve is used.
         let left = margin.since(Instant::ZERO + reserve);
         let floor_at = now + left;
         let moved = apart(floor_at, self.floor_at);
-        let is_due = self.holds(now, 0, changes, !leaves);
-        let is_moved = self.holds(now, 2, leaves && self.is_own && moved >= STEP, true);
+        let is_due = self.holds(now, CHANGE, changes, !leaves);
+        let is_moved = self.holds(now, MOVED, leaves && self.is_own && moved >= STEP, true);
         if is_due {
-            self.holds(now, 0, false, true);
+            self.holds(now, CHANGE, false, true);
         }
         if is_due && leaves {
             self.is_own = !node.withdraw(now);
@@ -299,7 +312,7 @@ impl Relay {
     /// Returns true while the relay requests to leave because of its endurance.
     pub fn leaves_by_endurance(&self) -> bool {
         let is_own = self.endurance.first().is_some_and(|it| it.is_own);
-        is_own && self.node.leaves().is_some()
+        is_own && self.node.departure_granted().is_some()
     }
 
     /// Returns true if the pilot has to fly the drone home now.
@@ -307,7 +320,7 @@ impl Relay {
     /// This is so if the relay has requested to leave, and either the chain allows the drone to leave ([`Event::MayLeave`]), or only the
     /// way home and the reserve are left. Takes constant time.
     pub fn must_leave(&self) -> bool {
-        let leaves = self.node.leaves();
+        let leaves = self.node.departure_granted();
         leaves.is_some_and(|is_free| is_free || self.is_at_reserve())
     }
 
@@ -328,7 +341,7 @@ impl Relay {
             ..Endurance::default()
         });
         if keeps_out {
-            self.node.set_spent(true);
+            self.node.set_too_low(true);
         }
     }
 

@@ -235,7 +235,7 @@ impl World {
             .guard
             .control(instant(self.now_s), drone.pilot.is_none());
         if let Some((_, place)) = drone.agreed.filter(|(line, _)| *line == drone.line.number) {
-            drone.guard.commit(placement(place));
+            drone.guard.set_goal(placement(place));
         }
     }
 
@@ -542,7 +542,7 @@ fn apply(world: &mut World, what: FlightEvent, report: &mut Report) {
             }
             drone.agreed = Some((line, place));
             if drone.line.number == line {
-                drone.guard.commit(placement(place));
+                drone.guard.set_goal(placement(place));
             }
         }
         FlightEvent::Turn(k, line) => {
@@ -552,7 +552,7 @@ fn apply(world: &mut World, what: FlightEvent, report: &mut Report) {
             if let Some((number, place)) = drone.agreed
                 && number == line.number
             {
-                drone.guard.commit(placement(place));
+                drone.guard.set_goal(placement(place));
             }
             report.turned = true;
         }

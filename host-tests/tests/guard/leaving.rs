@@ -44,7 +44,7 @@ impl Row {
             now: Instant::ZERO,
         };
         for (guard, x_m) in row.all.iter_mut().zip([100.0, 200.0, 300.0]) {
-            guard.commit(at(x_m));
+            guard.set_goal(at(x_m));
         }
         row.fly();
         assert!(row.all.iter().all(Guard::has_arrived));
@@ -155,7 +155,7 @@ fn joining(reports: &[(u64, f32)], lost: bool) -> (Guard, Instant) {
     if lost {
         guard.set_neighbour(Side::Downstream, Some(3));
     }
-    guard.commit(at(400.0));
+    guard.set_goal(at(400.0));
     guard.steer(now);
     (guard, now)
 }
@@ -253,7 +253,7 @@ fn a_hover_in_manual_flight_does_not_count() {
     guard.control(Instant::from_millis(2_000), true);
     let now = Instant::from_millis(2_100);
     guard.position(now, at(100.0));
-    guard.commit(at(400.0));
+    guard.set_goal(at(400.0));
     guard.steer(now);
     assert!(!offers(&mut guard));
 }

@@ -173,7 +173,7 @@ fn apply(world: &mut World, what: FlightEvent, report: &mut Report) {
         FlightEvent::Setpoint(k, at) => {
             report.heard += 1;
             if let Some(guard) = &mut world.drones[k].guard {
-                guard.commit(place(at));
+                guard.set_goal(place(at));
             }
         }
         FlightEvent::Off(k) => {
@@ -263,7 +263,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
             }
         }
         guard.set_leaver(0);
-        guard.commit(place(*target));
+        guard.set_goal(place(*target));
     }
     let distance = f64::from(world.config.geofence.most_x_m);
     let (begun_s, allowed_s) = (

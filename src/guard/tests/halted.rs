@@ -19,7 +19,7 @@ impl One {
     }
 }
 
-/// Returns a message of a neighbour that knows this relay's association (session). The message has the fence number
+/// Returns a message of a neighbour that knows this relay's association. The message has the fence number
 /// `number`. The neighbour's x and its agreed x are `x_m`.
 fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
     let echo = one.sent(side).association;
@@ -36,7 +36,7 @@ fn the_first_setpoint_holds_until_the_order_is_known() {
         guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
         now: Instant::ZERO,
     };
-    one.guard.commit(at(60.0));
+    one.guard.set_goal(at(60.0));
     // The relay is above its neighbour, to the side, and outside of the geofence.
     let high = aside(100.0, -80.0, 160.0);
     one.is_at_place(high);
@@ -63,7 +63,7 @@ fn a_start_outside_the_geofence_goes_no_farther_out() {
         guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
         now: Instant::ZERO,
     };
-    one.guard.commit(at(40.0));
+    one.guard.set_goal(at(40.0));
     one.is_at_place(at(-30.0));
     one.is_at_place(at(-30.0));
     assert_eq!(one.guard.setpoint(), Some(at(-30.0)));
@@ -90,7 +90,7 @@ fn relays_within_the_error_are_in_order_if_they_may_pass() {
                 guard: Guard::new(config, [None, Some(2)], 7, Instant::ZERO),
                 now: Instant::ZERO,
             };
-            one.guard.commit(at(60.0));
+            one.guard.set_goal(at(60.0));
             one.is_at(100.0);
             one.is_at(100.0);
             let told = Fence {
@@ -127,7 +127,7 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
             guard: Guard::new(config, [Some(1), Some(3)], 7, Instant::ZERO),
             now: Instant::ZERO,
         };
-        one.guard.commit(at(160.0));
+        one.guard.set_goal(at(160.0));
         one.is_at(100.0);
         one.is_at(100.0);
         one.receive(Side::Upstream, 1, fence(9, up_m, 50.0));
@@ -188,7 +188,7 @@ fn a_relay_that_halts_outside_the_geofence_stops_there() {
         guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
         now: Instant::ZERO,
     };
-    one.guard.commit(at(100.0));
+    one.guard.set_goal(at(100.0));
     let high = aside(100.0, 0.0, 180.0);
     one.is_at_place(high);
     one.is_at_place(high);
@@ -267,7 +267,7 @@ fn a_relay_flown_again_out_of_order_requests_a_halt() {
             guard: Guard::new(config(), neighbours, 7, Instant::ZERO),
             now: Instant::ZERO,
         };
-        one.guard.commit(at(100.0));
+        one.guard.set_goal(at(100.0));
         one.guard.control(one.now, false);
         one.is_at(100.0);
         one.receive(side, node, fence(9, x_m, x_m));
@@ -340,7 +340,7 @@ fn a_relay_moves_away_from_a_silent_one_before_across() {
         guard: Guard::new(config(), [Some(1), None], 7, Instant::ZERO),
         now: Instant::ZERO,
     };
-    one.guard.commit(at(102.0));
+    one.guard.set_goal(at(102.0));
     let high = aside(100.0, 0.0, 80.0);
     one.is_at_place(high);
     one.is_at_place(high);
@@ -426,7 +426,7 @@ fn a_reported_position_in_manual_flight_avoids_a_halt() {
 }
 
 /// Checks that a late fence message from before a reboot does not count as its sender's position. The x in such a
-/// message is that of the fence (limit of x), which may be far from the sender.
+/// message is that of the fence, which may be far from the sender.
 #[test]
 fn an_old_fence_gives_no_position_of_its_owner() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -473,7 +473,7 @@ fn gaps_that_are_negative_by_the_error_add_up() {
                 ..at([90.0, 200.0, 300.0][k])
             };
             let guard = &mut guards[k];
-            guard.commit(end);
+            guard.set_goal(end);
             guard.position(now, place);
             // The relays do not fly to their setpoints here: the message of relay 2 is checked before any move.
             guard.steer(now);
@@ -533,7 +533,7 @@ fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
             guards[1].set_neighbour(Side::Upstream, Some(1));
         }
         for k in first..3 {
-            guards[k].commit(places[k]);
+            guards[k].set_goal(places[k]);
             guards[k].position(now, places[k]);
             guards[k].steer(now);
             guards[k].remind();

@@ -34,7 +34,7 @@ fn at(x_m: f32) -> Placement {
 }
 
 /// Returns a neighbour's first message, at `x_m`, with the agreed x `target_m`. The neighbour does not know the
-/// association (session) number of the relay under test yet.
+/// association number of the relay under test yet.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,
@@ -60,7 +60,7 @@ impl One {
             guard: Guard::new(config(), neighbours, 7, Instant::ZERO),
             now: Instant::ZERO,
         };
-        one.guard.commit(at(target_m));
+        one.guard.set_goal(at(target_m));
         one.is_at(x_m);
         one.is_at(x_m);
         one
@@ -107,7 +107,7 @@ fn no_setpoint_before_an_agreed_position_and_a_report() {
     let mut guard = Guard::new(config(), [None, None], 7, Instant::from_millis(1000));
     let now = Instant::from_millis(2000);
     assert_eq!(guard.steer(now), None);
-    guard.commit(at(300.0));
+    guard.set_goal(at(300.0));
     assert_eq!(guard.steer(now), None);
     guard.position(Instant::from_millis(999), at(100.0));
     assert_eq!(guard.steer(now), None, "that was before the start");
@@ -126,14 +126,14 @@ fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
         y_m: -60.0,
         altitude_m: 1.0,
     };
-    one.guard.commit(far);
+    one.guard.set_goal(far);
     let cut = Placement {
         x_m: 1000.0,
         y_m: -50.0,
         altitude_m: 20.0,
     };
     assert_eq!(one.guard.steer(one.now), Some(cut));
-    one.guard.commit(at(f32::NAN));
+    one.guard.set_goal(at(f32::NAN));
     one.guard.position(one.now, at(f32::INFINITY));
     one.guard
         .handle_fence(Side::Upstream, 1, &fence(1, 2e7, 0.0));
@@ -141,7 +141,7 @@ fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Checks rule 1 of the guard: a relay stays beyond its upstream neighbour's fence (limit of x). This holds even if the
+/// Checks rule 1 of the guard: a relay stays beyond its upstream neighbour's fence. This holds even if the
 /// downstream neighbour started too close to the relay.
 #[test]
 fn a_relay_between_two_fences_keeps_its_promise() {
@@ -185,7 +185,7 @@ fn a_lost_relay_is_kept_clear_of() {
     one.guard.forget(Side::Downstream, false);
     assert_eq!(one.setpoint().to_bits(), 400.0_f32.to_bits());
 
-    lost.guard.commit(at(50.0));
+    lost.guard.set_goal(at(50.0));
     let least = lost.setpoint();
     assert!(least >= 300.0 - 200.0);
     lost.guard.set_neighbour(Side::Upstream, None);
@@ -208,7 +208,7 @@ fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
             one.receive(Side::Downstream, 3, lost.sent(Side::Upstream));
         }
         assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
-        one.guard.commit(at(100.0));
+        one.guard.set_goal(at(100.0));
         one.setpoint();
         one.is_at(100.0);
         one.is_at(100.0);
@@ -255,7 +255,7 @@ fn a_relay_on_the_wrong_side_of_a_lost_drone_does_not_join() {
             last.receive(Side::Upstream, 2, lost.sent(Side::Downstream));
         }
         assert_eq!(last.setpoint().to_bits(), 310.0_f32.to_bits());
-        last.guard.commit(at(500.0));
+        last.guard.set_goal(at(500.0));
         last.setpoint();
         last.is_at(500.0);
         last.is_at(500.0);
@@ -360,7 +360,7 @@ fn a_late_fence_does_not_restore_an_earlier_position() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
     let late = pair.owner.sent(Side::Downstream);
-    pair.owner.guard.commit(at(20.0));
+    pair.owner.guard.set_goal(at(20.0));
     pair.owner.setpoint();
     pair.owner.is_at(20.0);
     pair.owner.is_at(20.0);
@@ -402,12 +402,12 @@ fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut next = One::new([None, Some(3)], 100.0, 100.0);
     one.guard.set_neighbour(Side::Upstream, None);
     one.guard.forget(Side::Upstream, true);
-    one.guard.commit(at(200.0));
+    one.guard.set_goal(at(200.0));
     assert_eq!(one.setpoint().to_bits(), 300.0_f32.to_bits());
     let reason = one.guard.hold_reason(Side::Upstream);
     assert_eq!(reason, Some(HoldReason::Lost));
     // The relay moves away from them before it changes its lateral offset or altitude.
-    one.guard.commit(Placement {
+    one.guard.set_goal(Placement {
         y_m: 50.0,
         ..at(200.0)
     });
@@ -418,7 +418,7 @@ fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
         one.receive(Side::Upstream, 1, next.sent(Side::Downstream));
         next.receive(Side::Downstream, 3, one.sent(Side::Upstream));
     }
-    one.guard.commit(at(200.0));
+    one.guard.set_goal(at(200.0));
     assert_eq!(one.setpoint().to_bits(), 200.0_f32.to_bits());
 }
 
@@ -431,7 +431,7 @@ fn a_relay_never_received_may_be_anywhere() {
     let now = Instant::from_millis(1000);
     guard.position(now, at(500.0));
     for target in [100.0, 900.0] {
-        guard.commit(at(target));
+        guard.set_goal(at(target));
         guard.steer(now);
         assert_eq!(guard.steer(now), Some(at(500.0)));
     }
@@ -527,8 +527,8 @@ fn no_relay_moves_before_its_neighbour_is_received() {
         Some(HoldReason::Unheard)
     );
     // Away from the expected position of the neighbour, which may be right.
-    pair.owner.guard.commit(at(50.0));
-    pair.follower.guard.commit(at(400.0));
+    pair.owner.guard.set_goal(at(50.0));
+    pair.follower.guard.set_goal(at(400.0));
     assert_eq!(pair.setpoints(), Both(100.0, 300.0));
     pair.talk();
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
@@ -573,20 +573,20 @@ fn the_follower_follows_the_owner() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Checks rule 3 of the guard: neither a late message nor a replaced fence (limit of x) moves a relay.
+/// Checks rule 3 of the guard: neither a late message nor a replaced fence moves a relay.
 #[test]
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
     let high = pair.follower.sent(Side::Upstream);
     // The fence is lowered to (20 + 120 + 10) / 2, but the follower has not received that yet.
-    pair.owner.guard.commit(at(20.0));
-    pair.follower.guard.commit(at(120.0));
+    pair.owner.guard.set_goal(at(20.0));
+    pair.follower.guard.set_goal(at(120.0));
     pair.answer();
     pair.owner.is_at(20.0);
     let low = pair.owner.sent(Side::Downstream);
     assert_eq!(low.x_m.to_bits(), 75.0_f32.to_bits());
-    pair.owner.guard.commit(at(290.0));
+    pair.owner.guard.set_goal(at(290.0));
     pair.owner.receive(Side::Downstream, 2, high);
     assert_eq!(
         pair.owner.setpoint().to_bits(),
@@ -598,7 +598,7 @@ fn late_messages_grant_nothing() {
     pair.talk();
     let raised = pair.owner.sent(Side::Downstream);
     assert!(raised.x_m > low.x_m);
-    pair.follower.guard.commit(at(80.0));
+    pair.follower.guard.set_goal(at(80.0));
     pair.follower.receive(Side::Upstream, 1, low);
     assert!(
         pair.follower.setpoint() >= raised.x_m,
@@ -635,8 +635,8 @@ fn a_start_too_close_is_opened_before_anything_else() {
         y_m: 30.0,
         ..Placement::on_line(x_m, 90.0)
     };
-    pair.follower.guard.commit(high(600.0));
-    pair.owner.guard.commit(high(500.0));
+    pair.follower.guard.set_goal(high(600.0));
+    pair.owner.guard.set_goal(high(500.0));
     pair.talk();
     assert_eq!(pair.setpoints(), Both(94.0, 600.0));
     let low = |one: &One| one.guard.setpoint().unwrap().cross_section() == at(0.0).cross_section();
@@ -654,11 +654,11 @@ fn a_start_too_close_is_opened_before_anything_else() {
 #[test]
 fn relays_in_the_wrong_order_stay() {
     let mut pair = Pair::new([200.0, 100.0], [150.0, 300.0]);
-    pair.follower.guard.commit(at(300.0));
+    pair.follower.guard.set_goal(at(300.0));
     pair.talk();
     // Away from the expected position of the neighbour, which is right.
-    pair.owner.guard.commit(at(250.0));
-    pair.follower.guard.commit(at(140.0));
+    pair.owner.guard.set_goal(at(250.0));
+    pair.follower.guard.set_goal(at(140.0));
     pair.talk();
     assert_eq!(pair.setpoints(), Both(200.0, 150.0));
     assert_eq!(
@@ -669,7 +669,7 @@ fn relays_in_the_wrong_order_stay() {
 
 /// Checks that a restarted relay is recognised, and its late old messages are ignored.
 ///
-/// The restarted relay does not know the fence (limit of x) that it announced. Its neighbour respects this fence until
+/// The restarted relay does not know the fence that it announced. Its neighbour respects this fence until
 /// the two have exchanged messages.
 #[test]
 fn a_restart_is_distinguished_from_late_messages() {
@@ -681,7 +681,7 @@ fn a_restart_is_distinguished_from_late_messages() {
     // A restart needs another seed.
     pair.owner.guard = {
         let mut guard = Guard::new(config(), [None, Some(2)], 8, Instant::ZERO);
-        guard.commit(at(280.0));
+        guard.set_goal(at(280.0));
         guard
     };
     pair.owner.is_at(100.0);
@@ -694,7 +694,7 @@ fn a_restart_is_distinguished_from_late_messages() {
     );
     pair.talk();
     assert_eq!(pair.setpoints(), Both(280.0, 300.0));
-    pair.follower.guard.commit(at(110.0));
+    pair.follower.guard.set_goal(at(110.0));
     for _ in 0..2 {
         pair.follower.receive(Side::Upstream, 1, old);
     }
@@ -782,7 +782,7 @@ fn a_relay_out_of_order_grants_nothing() {
 fn a_setpoint_that_stays_for_five_reminders_is_held_up() {
     let mut own = Own::new(config(), 1, Instant::ZERO);
     own.begin(at(100.0), Instant::ZERO);
-    own.target = Some(at(300.0));
+    own.goal = Some(at(300.0));
     for reminder in 1..=5 {
         assert!(!own.is_held_up(Side::Downstream, true), "{reminder}");
         own.count_reminder();

@@ -24,7 +24,7 @@ impl Row {
                 let mut one = One::new([None, None], x_m, x_m);
                 let seed = 7 + u32::from(k);
                 one.guard = Guard::new(config(), neighbours(k), seed, Instant::ZERO);
-                one.guard.commit(at(x_m));
+                one.guard.set_goal(at(x_m));
                 one.is_at(x_m);
                 one.is_at(x_m);
                 one
@@ -83,7 +83,7 @@ fn no_relay_comes_nearer_to_one_in_manual_flight() {
     assert_eq!(row.all[1].guard.poll(), None);
     for (k, toward, away) in [(0, 180.0, 50.0), (2, 220.0, 350.0)] {
         let x_m = row.setpoint(k);
-        row.all[k].guard.commit(at(toward));
+        row.all[k].guard.set_goal(at(toward));
         assert_eq!(row.setpoint(k), x_m);
         let side = if k == 0 {
             Side::Downstream
@@ -96,7 +96,7 @@ fn no_relay_comes_nearer_to_one_in_manual_flight() {
             altitude_m: 90.0,
             ..at(away)
         };
-        row.all[k].guard.commit(high);
+        row.all[k].guard.set_goal(high);
         row.all[k].guard.steer(row.all[k].now);
         assert_eq!(
             row.all[k].guard.setpoint(),
@@ -106,7 +106,7 @@ fn no_relay_comes_nearer_to_one_in_manual_flight() {
     }
     assert_eq!(row.all[1].guard.hold_reason(Side::Upstream), None);
     // Both may move after an operator has reported the drone as gone.
-    row.all[0].guard.commit(at(180.0));
+    row.all[0].guard.set_goal(at(180.0));
     row.all[0].guard.forget(Side::Downstream, false);
     assert_eq!(row.setpoint(0), Some(180.0));
 }
@@ -121,7 +121,7 @@ fn no_relay_flies_through_a_drone_in_manual_flight() {
         let now = row.all[1].now;
         row.all[1].guard.position(now, drone);
         row.talk();
-        row.all[0].guard.commit(at(20.0));
+        row.all[0].guard.set_goal(at(20.0));
         assert_eq!(row.setpoint(0), Some(expected_m), "{y_m}");
         let reason = row.all[0].guard.hold_reason(Side::Downstream);
         let expected = (expected_m > 20.0).then_some(HoldReason::NotFlown);
@@ -139,7 +139,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     let mut row = Row::new();
     row.take();
     row.talk();
-    row.all[0].guard.commit(at(20.0));
+    row.all[0].guard.set_goal(at(20.0));
     assert_eq!(row.setpoint(0), Some(20.0));
     row.all[0].is_at(90.0);
     let now = row.all[1].now;
@@ -167,7 +167,7 @@ fn no_relay_moves_across_toward_a_drone_beside_it() {
         row.all[1].guard.position(now, beside);
         row.talk();
         let across = Placement { y_m, ..at(100.0) };
-        row.all[0].guard.commit(across);
+        row.all[0].guard.set_goal(across);
         let expected = if moves { across } else { at(100.0) };
         let one = &mut row.all[0];
         assert_eq!(one.guard.steer(one.now), Some(expected));
@@ -175,7 +175,7 @@ fn no_relay_moves_across_toward_a_drone_beside_it() {
 }
 
 /// Checks that a neighbour that became silent right after its start counts as lost. It had sent only its position, and
-/// had no association (session) yet.
+/// had no association yet.
 #[test]
 fn a_relay_that_fell_silent_after_its_start_is_lost() {
     let mut row = Row::new();
@@ -184,7 +184,7 @@ fn a_relay_that_fell_silent_after_its_start_is_lost() {
     row.all[1].guard.position(now, at(200.0));
     row.talk();
     row.all[0].guard.set_neighbour(Side::Downstream, None);
-    row.all[0].guard.commit(at(195.0));
+    row.all[0].guard.set_goal(at(195.0));
     assert!(row.setpoint(0) < Some(195.0));
     let reason = row.all[0].guard.hold_reason(Side::Downstream);
     assert_eq!(reason, Some(HoldReason::Lost));
@@ -211,14 +211,14 @@ fn a_late_position_of_a_drone_flown_again_is_no_obstacle() {
     row.all[1].is_at(200.0);
     row.talk();
     row.all[0].receive(Side::Downstream, 2, late);
-    row.all[0].guard.commit(at(140.0));
+    row.all[0].guard.set_goal(at(140.0));
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
 /// Checks that the hold reason states that a restarted neighbour does not fly to setpoints.
 ///
 /// The neighbour's companion computer restarted, and its pilot has not engaged setpoint control again. The limit of x
-/// of the neighbour's old association (session) still holds.
+/// of the neighbour's old association still holds.
 #[test]
 fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     let mut row = Row::new();
@@ -228,7 +228,7 @@ fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     row.all[1].guard.control(now, false);
     row.all[1].guard.position(now, at(200.0));
     row.talk();
-    row.all[0].guard.commit(at(195.0));
+    row.all[0].guard.set_goal(at(195.0));
     let least_m = row.setpoint(0);
     assert!(least_m < Some(195.0));
     row.talk();
@@ -241,7 +241,7 @@ fn a_relay_reports_that_its_neighbour_is_not_engaged() {
 #[test]
 fn a_relay_that_stands_for_long_reports_pending() {
     let mut row = Row::new();
-    row.all[0].guard.commit(at(180.0));
+    row.all[0].guard.set_goal(at(180.0));
     let _ = row.setpoint(0);
     let reason = |row: &Row| row.all[0].guard.hold_reason(Side::Downstream);
     assert_eq!(reason(&row), None);
@@ -249,8 +249,8 @@ fn a_relay_that_stands_for_long_reports_pending() {
         row.all[0].guard.remind();
     }
     assert_eq!(reason(&row), Some(HoldReason::Pending));
-    row.all[1].guard.commit(at(300.0));
-    row.all[2].guard.commit(at(400.0));
+    row.all[1].guard.set_goal(at(300.0));
+    row.all[2].guard.set_goal(at(400.0));
     for _ in 0..4 {
         row.talk();
         for k in 0..3 {
@@ -268,8 +268,8 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     let mut row = Row::new();
     row.take();
     row.talk();
-    row.all[0].guard.commit(at(150.0));
-    row.all[1].guard.commit(at(260.0));
+    row.all[0].guard.set_goal(at(150.0));
+    row.all[1].guard.set_goal(at(260.0));
     let before = row.all[1].now;
     row.all[1].now = before + crate::time::Duration::from_millis(1);
     row.give();
@@ -285,7 +285,7 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// Checks that a relay repeats the notice that it has left an association (session). It repeats the notice until the
+/// Checks that a relay repeats the notice that it has left an association. It repeats the notice until the
 /// neighbour has started a new association, even if the pilot has given control back before.
 #[test]
 fn lost_messages_are_repeated() {
@@ -330,8 +330,8 @@ fn late_messages_do_not_change_who_is_flown() {
         row.all[0].receive(Side::Downstream, 2, old[0]);
         row.all[2].receive(Side::Upstream, 2, old[1]);
     }
-    row.all[0].guard.commit(at(80.0));
-    row.all[2].guard.commit(at(320.0));
+    row.all[0].guard.set_goal(at(80.0));
+    row.all[2].guard.set_goal(at(320.0));
     assert_eq!(row.setpoint(0), Some(80.0), "it is free to go");
     assert_eq!(row.setpoint(2), Some(320.0), "it is free to go");
     row.talk();
@@ -343,13 +343,13 @@ fn late_messages_do_not_change_who_is_flown() {
         row.all[0].receive(Side::Downstream, 2, left[0]);
         row.all[2].receive(Side::Upstream, 2, left[1]);
     }
-    row.all[0].guard.commit(at(200.0 - APART));
+    row.all[0].guard.set_goal(at(200.0 - APART));
     row.all[0].guard.steer(row.all[0].now);
     while row.speak(0).is_some() || row.speak(1).is_some() {}
     assert_eq!(row.setpoint(0), Some(200.0 - APART));
 }
 
-/// Checks that two neighbours start a new association (session) after both were in manual control.
+/// Checks that two neighbours start a new association after both were in manual control.
 #[test]
 fn two_neighbours_are_released_and_flown_again() {
     let mut row = Row::new();
@@ -363,7 +363,7 @@ fn two_neighbours_are_released_and_flown_again() {
     row.all[1].is_at(200.0);
     row.all[1].is_at(200.0);
     row.talk();
-    row.all[1].guard.commit(at(240.0));
+    row.all[1].guard.set_goal(at(240.0));
     assert_eq!(row.setpoint(1), Some(200.0), "relay 3 has not been heard");
     row.all[2].guard.control(now, true);
     row.all[2].is_at(300.0);
@@ -377,7 +377,7 @@ fn no_relay_flies_before_it_is_engaged() {
     let mut guard = Guard::new(config(), [None, None], 7, Instant::ZERO);
     assert!(!guard.control(Instant::ZERO, true), "it is flown at first");
     assert!(guard.control(Instant::ZERO, false));
-    guard.commit(at(300.0));
+    guard.set_goal(at(300.0));
     let ms = Instant::from_millis;
     guard.position(ms(1_000), at(100.0));
     assert_eq!(guard.steer(ms(1_000)), None);

@@ -79,14 +79,14 @@ pub(crate) struct Leaving {
     outside_since: Option<Instant>,
     /// True for each side (toward Tx, toward Rx) at which this relay was the end of the chain. The values are those of
     /// the time at which the relay went outside of the chain.
-    ended: [bool; 2],
+    was_end: [bool; 2],
     /// True for each side whose neighbour has selected a different node in place of this relay.
-    passed: [bool; 2],
+    replaced: [bool; 2],
     /// True if this relay is a spare. Remains true if the spare requests to leave.
     spare: bool,
     free: bool,
     /// True while the drone has too little endurance for a return to the chain.
-    spent: bool,
+    too_low: bool,
     /// Time of the first order to leave since the request; `None` without an order.
     ///
     /// At a spare that has not joined yet: time of the first call.
@@ -108,7 +108,7 @@ pub(crate) struct Leaving {
     waiting: Option<(Side, u16)>,
     /// Relays that are allowed to leave, and that were reported to the firmware. One bit mask for each side of this
     /// relay; bit 0 is the nearest node.
-    told: [u8; 2],
+    informed: [u8; 2],
 }
 
 impl Leaving {
@@ -132,7 +132,7 @@ impl Leaving {
     /// Ends the order to leave.
     const fn end_order(&mut self) {
         self.ordered_at = None;
-        self.passed = [false; 2];
+        self.replaced = [false; 2];
     }
 
     /// Ends the orders of the previous view. A spare that it called is now a member; the others send hellos soon.
@@ -273,20 +273,20 @@ impl Node {
 
     /// Returns true if the settings never let this relay leave: no guard, or separate links. Separate links to the two
     /// neighbours are those of [`Wiring::Pair`]. The guard is the collision avoidance.
-    pub(crate) fn is_refused(&self, now: Instant) -> bool {
+    pub(crate) fn can_never_leave(&self, now: Instant) -> bool {
         let refusal = self.layers.departure_refusal(now, &self.member);
         let lasting = [Departure::NeedsGuard, Departure::NeedsChannel];
         refusal.is_some_and(|why| lasting.contains(&why))
     }
 
-    /// Records if the drone has too little endurance for a return to the chain: yes if `spent` is true.
-    pub(crate) const fn set_spent(&mut self, spent: bool) {
-        self.layers.leaving.spent = spent;
+    /// Records if the drone has too little endurance for a return to the chain: yes if `too_low` is true.
+    pub(crate) const fn set_too_low(&mut self, too_low: bool) {
+        self.layers.leaving.too_low = too_low;
     }
 
     /// Returns true if the drone may fly away, false if it has to wait. `None` unless this relay has requested to
     /// leave.
-    pub(crate) fn leaves(&self) -> Option<bool> {
+    pub(crate) fn departure_granted(&self) -> Option<bool> {
         let leaving = &self.layers.leaving;
         leaving.requested.then_some(leaving.free)
     }
@@ -327,7 +327,7 @@ impl Node {
         if fresh && !self.layers.round.is_idle() {
             self.layers.round.cancel_work();
         }
-        self.layers.leaving.ended = [0, 1].map(|at: usize| {
+        self.layers.leaving.was_end = [0, 1].map(|at: usize| {
             let known = self.layers.neighbours.nodes().get(at).copied().flatten();
             known.is_none() && (!fresh || ends.get(at).copied().unwrap_or(false))
         });
@@ -368,7 +368,7 @@ impl Node {
             outside_since,
             spare,
             free,
-            spent,
+            too_low,
             ..
         } = self.layers.leaving;
         let settings = &self.member.settings;
@@ -377,7 +377,7 @@ impl Node {
         } else {
             settings.dead_after
         };
-        let may_return = !spare && !free && !spent;
+        let may_return = !spare && !free && !too_low;
         if may_return && outside_since.is_some_and(|at| now.since(at) >= most) {
             self.come_back(now);
         }
@@ -393,7 +393,7 @@ impl Node {
 
     /// Returns true if node `to` at `side`, outside of the chain, is allowed to leave. This is so once the view without
     /// it is agreed on, and the relays of this view are in place.
-    pub(super) fn frees(&self, side: Side, to: u16) -> bool {
+    pub(super) fn may_fly_away(&self, side: Side, to: u16) -> bool {
         let lease = &self.layers.lease;
         let complete = lease.is_whole() && lease.until().is_some() && lease.orders().in_place;
         complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
@@ -403,30 +403,30 @@ impl Node {
     /// raised a second time only if the node was a neighbour in the meantime.
     pub(super) fn on_freed(&mut self, side: Side, to: u16) {
         let bit = mask(to.abs_diff(self.member.node));
-        if let Some(told) = self.layers.leaving.told.get_mut(side as usize)
-            && *told & bit == 0
+        if let Some(informed) = self.layers.leaving.informed.get_mut(side as usize)
+            && *informed & bit == 0
         {
-            *told |= bit;
+            *informed |= bit;
             self.raise_node_event(NodeEvent::MayLeaveTold, side, to);
         }
     }
 
     /// Returns true if the leader calls node `to` at `side`, outside of the chain, to join the chain.
-    pub(super) fn calls(&self, side: Side, to: u16) -> bool {
+    pub(super) fn calls_to_join(&self, side: Side, to: u16) -> bool {
         self.layers.lease.orders().joiner == to
             && self.is_beside(side, to)
             && !self.steering.has_lost(side)
     }
 
-    /// Updates the position that this relay must reach to report that it is in place. `wanted` is the position to fly
-    /// to; `None` if there is no such position.
-    pub(super) fn update_goal(&mut self, wanted: Option<Placement>) {
+    /// Updates the position that this relay must reach to report that it is in place. `destination` is the position to
+    /// fly to; `None` if there is no such position.
+    pub(super) fn update_goal(&mut self, destination: Option<Placement>) {
         // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
         let is_held = [Side::Upstream, Side::Downstream]
             .into_iter()
             .any(|side| self.steering.hold_reason(side) == Some(HoldReason::Lost));
         let goal = if is_held {
-            self.steering.setpoint(wanted)
+            self.steering.setpoint(destination)
         } else {
             self.layers.round.agreed_place()
         };
@@ -522,7 +522,7 @@ impl Node {
 
     /// Handles the part of a hello of node `from` that concerns relays outside of the chain. Returns true if the rest
     /// of the hello must be ignored, because this relay or the sender is outside of the chain.
-    pub(super) fn on_departure(
+    pub(super) fn handle_outside_hello(
         &mut self,
         now: Instant,
         side: Side,
@@ -538,7 +538,7 @@ impl Node {
                 .record_unselected(now, &settings);
             let later = hello.latest_view > self.member.view;
             let leaving = &mut self.layers.leaving;
-            let [up, down] = leaving.ended;
+            let [up, down] = leaving.was_end;
             // The chain goes on beyond this relay as it did before.
             let goes_on = match (side, hello.neighbour) {
                 (Side::Upstream, 0) => down,
@@ -546,8 +546,8 @@ impl Node {
                 (Side::Downstream, 0) => up,
                 (Side::Downstream, beyond) => beyond < own,
             };
-            let told = hello.outside && !hello.fresh && later && goes_on;
-            if told && !leaving.is_spare() && !leaving.free {
+            let is_free = hello.outside && !hello.fresh && later && goes_on;
+            if is_free && !leaving.is_spare() && !leaving.free {
                 leaving.free = true;
                 self.raise(Event::MayLeave);
             } else if hello.ready && !hello.fresh && leaving.is_spare() {
@@ -585,8 +585,8 @@ impl Node {
             return true;
         }
         let leaving = &mut self.layers.leaving;
-        if is_neighbour && let Some(told) = leaving.told.get_mut(side as usize) {
-            *told &= !mask(from.abs_diff(own));
+        if is_neighbour && let Some(informed) = leaving.informed.get_mut(side as usize) {
+            *informed &= !mask(from.abs_diff(own));
         }
         // A spare that was called counts as one until it has joined: the departure waits for it.
         if let Some((node, at)) = &mut leaving.heard_spare
@@ -596,15 +596,15 @@ impl Node {
             *at = now;
         }
         let ordered = self.layers.lease.orders().leaver == own && leaving.requested;
-        if is_neighbour && let Some(passed) = leaving.passed.get_mut(side as usize) {
-            *passed = hello.neighbour != own;
+        if is_neighbour && let Some(replaced) = leaving.replaced.get_mut(side as usize) {
+            *replaced = hello.neighbour != own;
         }
-        let passed = leaving.passed;
-        let is_passed = [Side::Upstream, Side::Downstream]
+        let replaced = leaving.replaced;
+        let is_replaced = [Side::Upstream, Side::Downstream]
             .into_iter()
-            .zip(passed)
-            .all(|(side, passed)| passed || self.layers.neighbours.at(side).has_no_peer());
-        if is_neighbour && ordered && is_passed && !self.layers.view.has_no_quorum() {
+            .zip(replaced)
+            .all(|(side, replaced)| replaced || self.layers.neighbours.at(side).has_no_peer());
+        if is_neighbour && ordered && is_replaced && !self.layers.view.has_no_quorum() {
             self.go_outside(now, false);
             return true;
         }

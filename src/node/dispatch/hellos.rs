@@ -48,8 +48,9 @@ impl Node {
                     if hello.outside {
                         hello.ready = self.layers.leaving.is_spare();
                     } else {
-                        hello.ready = self.is_between(now, side, to) || self.calls(side, to);
-                        hello.outside = self.frees(side, to);
+                        hello.ready =
+                            self.is_between(now, side, to) || self.calls_to_join(side, to);
+                        hello.outside = self.may_fly_away(side, to);
                         if hello.outside {
                             self.on_freed(side, to);
                         }
@@ -180,7 +181,7 @@ impl Node {
         if hello.requests_reply {
             self.schedule_hello(side, from, false);
         }
-        if self.on_departure(now, side, from, &hello) {
+        if self.handle_outside_hello(now, side, from, &hello) {
             return self.review_neighbours(now);
         }
         if self.layers.neighbours.at(side).node() == from {

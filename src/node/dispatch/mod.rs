@@ -7,7 +7,8 @@
 //! | --- | --- |
 //! | `incoming` | received messages: checks, side of the sender, choice of the layer; results of handshakes |
 //! | `timers` | expired timers of all layers |
-//! | `adoption` | adoption of a decided view and its mission; the setpoint, and the drone's reports that affect it |
+//! | `adoption` | adoption of a decided view and its mission |
+//! | `motion` | the setpoint, and the drone's reports that affect it |
 //! | `claims` | claims to this node's number |
 //! | `departure` | relays that leave the chain, or wait outside of it |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
@@ -48,6 +49,7 @@ mod claims;
 pub(crate) mod departure;
 mod hellos;
 mod incoming;
+mod motion;
 mod offers;
 mod telemetry;
 mod timers;

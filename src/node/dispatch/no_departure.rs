@@ -49,7 +49,7 @@ impl Layers {
 impl Node {
     pub(crate) const fn leave(&self, _: Instant, _: Option<u16>) {}
 
-    pub(crate) const fn leaves(&self) -> Option<bool> {
+    pub(crate) const fn departure_granted(&self) -> Option<bool> {
         None
     }
 
@@ -57,21 +57,21 @@ impl Node {
         true
     }
 
-    pub(crate) const fn is_refused(&self, _: Instant) -> bool {
+    pub(crate) const fn can_never_leave(&self, _: Instant) -> bool {
         true
     }
 
-    pub(crate) const fn set_spent(&self, _: bool) {}
+    pub(crate) const fn set_too_low(&self, _: bool) {}
 
     pub(super) const fn return_if_expired(&self, _: Instant) {}
 
-    pub(super) const fn frees(&self, _: Side, _: u16) -> bool {
+    pub(super) const fn may_fly_away(&self, _: Side, _: u16) -> bool {
         false
     }
 
     pub(super) const fn on_freed(&self, _: Side, _: u16) {}
 
-    pub(super) const fn calls(&self, _: Side, _: u16) -> bool {
+    pub(super) const fn calls_to_join(&self, _: Side, _: u16) -> bool {
         false
     }
 
@@ -85,7 +85,13 @@ impl Node {
     ///
     /// False if node `from` is the neighbour: the hello then shows that `from` has not selected this relay, which ends
     /// the link.
-    pub(super) fn on_departure(&self, _: Instant, side: Side, from: u16, hello: &Hello) -> bool {
+    pub(super) fn handle_outside_hello(
+        &self,
+        _: Instant,
+        side: Side,
+        from: u16,
+        hello: &Hello,
+    ) -> bool {
         hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
     }
 }

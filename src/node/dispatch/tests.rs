@@ -509,7 +509,7 @@ fn an_order_to_leave_comes_before_the_relays_own_request() {
     };
     node.steering.begin(&settings, [Some(1), Some(3)], 1, NOW);
     node.leave(NOW, None);
-    assert_eq!(node.leaves(), Some(false));
+    assert_eq!(node.departure_granted(), Some(false));
     for (ordered, expected) in [(0, 2), (3, 3), (2, 2), (0, 2)] {
         node.layers.lease.set_orders(Orders {
             leaver: ordered,

@@ -91,7 +91,7 @@ impl Node {
         }
         let node = neighbour.node();
         let ended = neighbour.has_no_peer();
-        let dead = layers.lease.span(settings);
+        let dead = layers.lease.silence_until_lost(settings);
         // Before the first lease many relays may search on the channel at the same time.
         let is_crowded = settings.wiring == Wiring::Shared && layers.lease.is_pending();
         let asking = is_crowded.then(|| patient_tick(settings, self.member.all));

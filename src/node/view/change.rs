@@ -287,13 +287,13 @@ impl ViewChange {
         } else {
             electorate::remaining_wait(&poll, context.longest_lease())
         };
-        let verdict = ViewVerdict {
+        let decision = ViewDecision {
             reached: rank,
             base: poll.agreed,
             accepted,
             usable_in,
         };
-        self.apply_view_verdict(context, verdict)
+        self.apply_view_decision(context, decision)
     }
 
     /// Schedules a new view proposal after a refusal, because more relays may be reachable by then.
@@ -313,25 +313,25 @@ impl ViewChange {
                         view.id != proposed.view || view.relays > proposed.rank
                     }) =>
             {
-                let verdict = ViewVerdict {
+                let decision = ViewDecision {
                     reached: decision.reached,
                     base: decision.base,
                     accepted: decision.accepted,
                     usable_in: decision.usable_in,
                 };
-                self.apply_view_verdict(context, verdict)
+                self.apply_view_decision(context, decision)
             }
             _ => Effects::STALE,
         }
     }
 
-    fn apply_view_verdict(&mut self, context: &Context<'_>, verdict: ViewVerdict) -> Effects {
-        let ViewVerdict {
+    fn apply_view_decision(&mut self, context: &Context<'_>, decision: ViewDecision) -> Effects {
+        let ViewDecision {
             reached,
             base,
             accepted,
             usable_in,
-        } = verdict;
+        } = decision;
         let Some(proposed) = &mut self.proposed else {
             return Effects::NONE;
         };
@@ -529,7 +529,7 @@ pub(crate) struct Proposed {
 
 /// Decision on a view proposal. `accepted` is the accepted view; `None` if the voters were no quorum.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ViewVerdict {
+pub(super) struct ViewDecision {
     pub(super) reached: u16,
     pub(super) base: View,
     pub(super) accepted: Option<View>,
