@@ -41,7 +41,7 @@ fn row(relays: usize, from_m: f64, step_m: f64) -> Vec<Point> {
 
 fn commit(world: &mut World, places: &[Point]) {
     for (drone, at) in world.drones.iter_mut().zip(places) {
-        drone.guard.as_mut().unwrap().commit(place(*at));
+        drone.guard.as_mut().unwrap().set_goal(place(*at));
     }
 }
 

@@ -88,8 +88,8 @@ impl Row {
     fn close_up(&mut self) -> [f32; 2] {
         self.all[0].set_neighbour(Side::Downstream, Some(3));
         self.all[2].set_neighbour(Side::Upstream, Some(1));
-        self.all[0].commit(at(195.0));
-        self.all[2].commit(at(205.0));
+        self.all[0].set_goal(at(195.0));
+        self.all[2].set_goal(at(205.0));
         self.fly();
         [0, 2].map(|index: usize| self.all[index].setpoint().unwrap().x_m)
     }
@@ -138,7 +138,7 @@ fn no_relay_closes_up_to_a_pilot() {
 fn a_relay_that_stays_gets_its_room_back() {
     let mut row = Row::new();
     row.order(2);
-    row.all[1].commit(at(170.0));
+    row.all[1].set_goal(at(170.0));
     row.order(0);
     assert_eq!(row.all[1].setpoint(), Some(at(170.0)));
 }
@@ -199,7 +199,7 @@ fn a_relay_that_joins_from_a_hover_is_known_at_once() {
 fn a_relay_that_joins_keeps_clear_of_a_lost_one() {
     let (mut guard, mut now) = joining(&HOVER, true);
     let mut next = Guard::new(config(), [Some(1), None], 9, Instant::ZERO);
-    next.commit(at(500.0));
+    next.set_goal(at(500.0));
     for _ in 0..20 {
         now = now + Duration::from_millis(1_000);
         for (one, x_m) in [(&mut guard, 100.0), (&mut next, 500.0)] {
