@@ -133,7 +133,7 @@ const IMAGES: &[Image] = &[
         // - departures, spares, and motions that begin and end together: 6.75 KiB flash, 280 bytes RAM
         // - endurance: 4 KiB flash of this image, 1 KiB of the others with an autopilot; 180 bytes RAM
         // - states of refused setpoints and of nodes with another mission or key in reports: 1 KiB
-        [242 * 1024 + 256, 16_640, 7_168],
+        [243 * 1024, 16_640, 7_168],
     ),
 ];
 
