@@ -116,7 +116,8 @@ impl Report {
     /// Replaces this report by `newer`, another report of the same relay. If `newer` has no details, those of this report
     /// are kept.
     ///
-    /// Returns false, and changes nothing, if `newer` is not newer: copies of a report arrive by several ways.
+    /// Returns false, and changes nothing, if `newer` is not newer: copies of a report arrive by several ways. Times of
+    /// reports are times of the station's clock, which must not run backward.
     pub fn update(&mut self, newer: Self) -> bool {
         if newer.at <= self.at {
             return false;

@@ -274,9 +274,10 @@ impl Lease {
         let waited = now.since(known.leaver.1);
         let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
         let may_leave = context.member.keeps_quorum_without(requests.leaver);
-        let late = may_leave && (waited >= most || waited >= left);
-        // A spare is silent between the order to join and its arrival.
-        let spare = if requests.spare == 0 {
+        let is_over = waited >= most || waited >= left;
+        let late = may_leave && is_over;
+        // A spare is silent between the order to join and its arrival. A request whose spare never arrives ends.
+        let spare = if requests.spare == 0 && !is_over {
             self.orders.joiner
         } else {
             requests.spare
@@ -630,7 +631,7 @@ mod tests {
 
     use std::vec::Vec;
 
-    use super::{Current, Lease};
+    use super::{Current, Lease, longest_lease};
     use crate::mission::Mission;
     use crate::mission::tests::paper;
     use crate::node::context::{Context, Member, OtherLeases};
@@ -695,6 +696,44 @@ mod tests {
         };
         let all = (5..=300).step_by(5);
         all.filter(|at_s| !gives(*at_s)).collect()
+    }
+
+    /// Checks that a spare that never arrives is called no longer, for the proposer of a view of two.
+    ///
+    /// The proposer keeps no quorum without a spare. If the spare never arrives, the other relay may leave.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn a_called_spare_that_never_arrives_is_called_no_longer() {
+        let settings = Settings::default();
+        let mission = Mission::try_new(paper(3)).unwrap();
+        let mut member = Member::new(mission, settings, 1);
+        member.mission = mission.with_relays(2).unwrap();
+        let mut lease = Lease::new(1, Instant::ZERO, &settings);
+        lease.on_agreement(Instant::ZERO, true);
+        let mut called = |at_s: u64, spare: u16| {
+            let context = Context {
+                now: Instant::from_millis(1_000 * at_s),
+                member: &member,
+                latest: member.active,
+                is_last_reachable: false,
+                other_leases: OtherLeases::NONE,
+            };
+            lease.requests = Some(Requests {
+                leaver: 1,
+                endurance_s: u16::MAX,
+                spare,
+                in_place: true,
+            });
+            lease.orders = lease.next_orders(&context);
+            assert_eq!(lease.orders.leaver, 0, "{at_s} s");
+            lease.orders.joiner
+        };
+        assert_eq!([5, 10].map(|at_s| called(at_s, 3)), [0, 3]);
+        assert_eq!(called(15, 0), 3);
+        let most_s = longest_lease(&settings).as_micros() / 1_000_000;
+        assert_eq!(called(most_s, 0), 3);
+        assert_eq!(called(most_s + 10, 0), 0);
+        assert_eq!(called(most_s + 20, 3), 3);
     }
 
     /// Checks that relays that move after a later agreement of a view are not in place.

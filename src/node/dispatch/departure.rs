@@ -577,7 +577,10 @@ impl Node {
                 self.layers.neighbours.at_mut(side).give_up(now, false);
                 self.steering.set_neighbour(side, None);
             } else if !hello.ready {
-                self.layers.leaving.waiting = Some((side, from));
+                let leaving = &mut self.layers.leaving;
+                leaving.waiting = Some((side, from));
+                // A spare that requests to leave is one no longer.
+                leaving.heard_spare = leaving.heard_spare.filter(|(node, _)| *node != from);
             } else if self.is_beside(side, from) && !self.steering.has_lost(side) {
                 // Beside a lost drone that may still hover, a spare could fly into it.
                 self.layers.leaving.heard_spare = Some((from, now));
