@@ -668,6 +668,17 @@ mod tests {
         assert_eq!(span_after(2), 150);
     }
 
+    #[cfg(feature = "departures")]
+    fn context(member: &Member, at_s: u64) -> Context<'_> {
+        Context {
+            now: Instant::from_millis(1_000 * at_s),
+            member,
+            latest: member.active,
+            is_last_reachable: false,
+            other_leases: OtherLeases::NONE,
+        }
+    }
+
     /// Returns the times, s, at which the leader's orders state that some relay is not in place. The leader agrees at 0
     /// s, and every 5 s, until 300 s, gives orders after a renewal that reports `is_in_place(time)`.
     #[cfg(feature = "departures")]
@@ -680,13 +691,7 @@ mod tests {
         let mut lease = Lease::new(1, Instant::ZERO, &settings);
         lease.on_agreement(Instant::ZERO, true);
         let mut gives = |at_s: u64| {
-            let context = Context {
-                now: Instant::from_millis(1_000 * at_s),
-                member: &member,
-                latest: member.active,
-                is_last_reachable: false,
-                other_leases: OtherLeases::NONE,
-            };
+            let context = context(&member, at_s);
             lease.requests = Some(Requests {
                 in_place: is_in_place(at_s),
                 ..Requests::NONE
@@ -711,13 +716,7 @@ mod tests {
         let mut lease = Lease::new(1, Instant::ZERO, &settings);
         lease.on_agreement(Instant::ZERO, true);
         let mut called = |at_s: u64, spare: u16| {
-            let context = Context {
-                now: Instant::from_millis(1_000 * at_s),
-                member: &member,
-                latest: member.active,
-                is_last_reachable: false,
-                other_leases: OtherLeases::NONE,
-            };
+            let context = context(&member, at_s);
             lease.requests = Some(Requests {
                 leaver: 1,
                 endurance_s: u16::MAX,

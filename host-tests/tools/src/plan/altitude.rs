@@ -11,7 +11,6 @@ use uav_relay::optimiser::spacing::RequiredPosition;
 use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
-use super::rate::Rate;
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
 use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::{Scenario, mission};
@@ -58,7 +57,7 @@ const RATIO_STEPS: u8 = 8;
 /// for the ratio r.
 ///
 /// # Errors
-/// As [`best`].
+/// [`NoPlan`] for the same reasons as [`best`].
 pub(super) fn best_for_rate(
     scenario: &Scenario,
     relays: u16,
@@ -68,9 +67,15 @@ pub(super) fn best_for_rate(
     let reverse = scenario.reverse;
     let mut best = best(scenario, relays, tolerance)?;
     // Rates to Rx, and back divided by r, while a hop transmits.
-    let rates = |plan: &Plan| match Rate::of_hop(plan, scenario, radio) {
-        Rate::Both([there_bps, back_bps]) => [there_bps, back_bps / reverse],
-        Rate::There(there_bps) => [there_bps; 2],
+    let worst_bps = |sirs: &[f64]| {
+        let worst = sirs.iter().copied().reduce(f64::min);
+        radio.hop_bps(worst.unwrap_or(0.0))
+    };
+    let rates = |plan: &Plan| {
+        [
+            worst_bps(&plan.sirs),
+            worst_bps(&plan.sirs_back(scenario)) / reverse,
+        ]
     };
     let least = |[there_bps, back_bps]: [f64; 2]| there_bps.min(back_bps);
     let model = &radio.link.model;
