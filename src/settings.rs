@@ -167,6 +167,13 @@ pub struct Settings {
     /// the last of the chain, a neighbour comes within a few metres of it.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
+    /// Number of relays that the leader keeps in the chain, as long as spares wait; 0 for a fleet without such a number.
+    ///
+    /// While the chain has fewer relays, for example after losses, the leader calls a spare, also without a request to
+    /// leave. Above half of the mission's relays, and at most all of them. Use the same value for all relays of a
+    /// chain, because each of them may become the leader.
+    #[cfg(feature = "departures")]
+    pub flying: u16,
     /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
     /// mission without Tx and Rx positions is then rejected if its distance from Tx to Rx differs from the distance
     /// between the surveyed positions. Set it on all relays of a chain, or on none.
@@ -216,6 +223,8 @@ impl Settings {
         respacing: Duration::from_micros(0),
         #[cfg(feature = "departures")]
         leave_without_guard: false,
+        #[cfg(feature = "departures")]
+        flying: 0,
         sited: false,
     };
 
@@ -332,6 +341,8 @@ pub enum SetupError {
     Guard,
     /// `respacing` is longer than four times `dead_after`.
     Respacing,
+    /// `flying` is above 0, but not within more than half of the mission's relays and all of them.
+    Flying,
 }
 
 error_texts!(SetupError {
@@ -350,6 +361,7 @@ error_texts!(SetupError {
     WithoutQuorum => "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4",
     Guard => "guard: geofence limits must be within -1e7 to 1e7 m, each lower limit at most its upper limit; separation_m within 0 to 1e5, relays within 1 to 1000, hover_m (position error of a hovering drone) within 0 to 1e3; guard needs the cargo feature `guard`",
     Respacing => "respacing (duration of the motion to new positions) must be at most four times dead_after",
+    Flying => "flying (number of relays kept in the chain) must be 0, or above half of the mission's relays and at most all of them",
 });
 
 pub(crate) fn check(
@@ -429,6 +441,12 @@ pub(crate) fn check(
     #[cfg(feature = "departures")]
     if settings.respacing > settings.dead_after.times(4) {
         return Err(SetupError::Respacing);
+    }
+    #[cfg(feature = "departures")]
+    if settings.flying > 0
+        && !(mission.relays() / 2 + 1..=mission.relays()).contains(&settings.flying)
+    {
+        return Err(SetupError::Flying);
     }
     Ok(())
 }

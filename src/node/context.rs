@@ -401,6 +401,14 @@ pub(crate) const fn respacing(settings: &Settings) -> Duration {
     return settings.dead_after.times(0);
 }
 
+/// Returns the number of relays that the leader keeps in the chain while spares wait; 0 for no such number.
+pub(crate) const fn flying(settings: &Settings) -> u16 {
+    #[cfg(feature = "departures")]
+    return settings.flying;
+    #[cfg(not(feature = "departures"))]
+    return 0;
+}
+
 /// Returns the maximum time from the leader's first message along the chain until its result returns.
 ///
 /// The chain has `all` relays, and loses half of its frames.

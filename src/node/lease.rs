@@ -52,7 +52,7 @@
 use super::circulation::{Circulation, Reply};
 use super::context::OtherLeases;
 use super::context::{Context, Effects, LayerEvent, Peer};
-use super::context::{PAUSE, earliest, longest_lease, respacing, tenths};
+use super::context::{PAUSE, earliest, flying, longest_lease, respacing, tenths};
 use crate::features::DEPARTURES;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
@@ -106,7 +106,7 @@ struct Departures {
     /// Number of relays in the view before a relay first requested to leave.
     complement: u16,
     /// Relay that requests to leave (0 for none), and the time of its first request. The request may be from an earlier
-    /// view.
+    /// view. Without a request: the time at which a spare was last reported.
     leaver: (u16, Instant),
     /// Last time at which all relays of the view were in place; at first the time of the first agreement.
     ///
@@ -243,7 +243,8 @@ impl Lease {
     ///
     /// A relay is ordered to leave once two consecutive renewals have reported all relays in place. By then a relay
     /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
-    /// it joins first, unless the view already has more relays than before the request to leave.
+    /// it joins first, unless the view already has more relays than `Settings::flying`, or, without this number, more
+    /// than before the request to leave. A spare is called at once: while it comes, the relays may still move.
     ///
     /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration
     /// of a motion, counted from the first agreement in this view, or from the last time that all were in place. A
@@ -268,25 +269,30 @@ impl Lease {
         if requests.leaver == 0 || known.complement == 0 {
             known.complement = relays;
         }
-        if requests.leaver != known.leaver.0 {
+        let leaves = requests.leaver != 0;
+        if requests.leaver != known.leaver.0 || !leaves && requests.spare != 0 {
             known.leaver = (requests.leaver, now);
         }
         let waited = now.since(known.leaver.1);
         let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
-        let may_leave = context.member.keeps_quorum_without(requests.leaver);
-        let is_over = waited >= most || waited >= left;
+        let may_leave = leaves && context.member.keeps_quorum_without(requests.leaver);
+        let is_over = waited >= most || leaves && waited >= left;
         let late = may_leave && is_over;
-        // A spare is silent between the order to join and its arrival. A request whose spare never arrives ends.
+        // A spare is silent between the order to join and its arrival. The call of a spare that never arrives ends.
         let spare = if requests.spare == 0 && !is_over {
             self.orders.joiner
         } else {
             requests.spare
         };
-        let joins = requests.leaver != 0 && spare != 0 && relays <= known.complement && !late;
-        let settled = in_place && self.orders.in_place;
-        if joins && (settled || self.orders.joiner != 0) {
+        // A departure needs one relay more than the chain keeps.
+        let kept = match flying(context.settings()) {
+            0 if leaves => known.complement,
+            flying => flying,
+        };
+        let joins = spare != 0 && relays < kept.saturating_add(leaves.into()) && !late;
+        if joins {
             orders.joiner = spare;
-        } else if !joins && may_leave && (settled || late) {
+        } else if may_leave && (late || in_place && self.orders.in_place) {
             orders.leaver = requests.leaver;
         }
         orders
@@ -727,12 +733,44 @@ mod tests {
             assert_eq!(lease.orders.leaver, 0, "{at_s} s");
             lease.orders.joiner
         };
-        assert_eq!([5, 10].map(|at_s| called(at_s, 3)), [0, 3]);
+        assert_eq!([5, 10].map(|at_s| called(at_s, 3)), [3, 3]);
         assert_eq!(called(15, 0), 3);
         let most_s = longest_lease(&settings).as_micros() / 1_000_000;
         assert_eq!(called(most_s, 0), 3);
         assert_eq!(called(most_s + 10, 0), 0);
         assert_eq!(called(most_s + 20, 3), 3);
+    }
+
+    /// Checks that the leader calls a spare without a request to leave if, and only if, the chain has fewer relays than
+    /// it keeps. A spare that never arrives is called no longer.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn a_spare_is_called_while_relays_are_too_few() {
+        let called = |flying: u16, reports: &[(u64, u16)]| {
+            let settings = Settings {
+                flying,
+                ..Settings::default()
+            };
+            let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
+            let mut lease = Lease::new(1, Instant::ZERO, &settings);
+            lease.on_agreement(Instant::ZERO, true);
+            let mut joiners = Vec::new();
+            for &(at_s, spare) in reports {
+                lease.requests = Some(Requests {
+                    spare,
+                    ..Requests::NONE
+                });
+                lease.orders = lease.next_orders(&context(&member, at_s));
+                assert_eq!(lease.orders.leaver, 0);
+                joiners.push(lease.orders.joiner);
+            }
+            joiners
+        };
+        let most_s = longest_lease(&Settings::default()).as_micros() / 1_000_000;
+        let reports = [(5, 0), (10, 5), (15, 0), (most_s + 5, 0), (most_s + 15, 0)];
+        assert_eq!(called(0, &reports), [0; 5]);
+        assert_eq!(called(3, &reports), [0; 5]);
+        assert_eq!(called(4, &reports), [0, 5, 5, 5, 0]);
     }
 
     /// Checks that relays that move after a later agreement of a view are not in place.

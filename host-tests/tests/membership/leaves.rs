@@ -514,6 +514,22 @@ fn a_spare_joins_first_although_hellos_are_lost() {
     }
 }
 
+/// Checks that a spare joins after the loss of a relay if the leader keeps a number of relays in the chain. The spare
+/// waits beside the lost relay, or far from it. Without such a number the spare is not called.
+#[test]
+fn a_spare_replaces_a_lost_relay() {
+    for (flying, lost) in [(8, 4), (8, 9), (8, 1), (0, 4)] {
+        let mut setup = departing(9, &[]);
+        setup.settings.flying = flying;
+        setup.spares = vec![5];
+        setup.kills = vec![(lost, seconds(AT_S))];
+        let outcome = run(setup.clone()).unwrap();
+        let is_left = |relay: &u16| *relay != lost && (flying > 0 || *relay != 5);
+        let left: Vec<u16> = (1..=9).filter(is_left).collect();
+        judge(&setup, &outcome, &left).unwrap();
+    }
+}
+
 /// Draws a scene of nine relays of equal altitude and power, with Tx and Rx 500 m to 3 km apart. The interferer's x is between Tx and Rx,
 /// its y is 0.1 to 1 times the distance from Tx to Rx.
 fn scene(rng: &mut ChaCha8Rng) -> Link {

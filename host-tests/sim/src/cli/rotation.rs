@@ -61,6 +61,7 @@ impl Rotation {
         let respacing_s =
             (f64::from(config.distance_m) / f64::from(flying + 1) / SPACING_MPS).clamp(15.0, 60.0);
         setup.settings.respacing = duration(respacing_s);
+        setup.settings.flying = flying;
         setup.rotation = Some(RotationSpec {
             flying,
             endurance_s: self.endurance.unwrap_or(1_500.0),
