@@ -212,6 +212,14 @@ pub(crate) struct BatteryOptions {
     /// Wait outside of the chain as a spare until the leader calls this relay; only with --shared
     #[arg(long, requires = "shared")]
     pub(crate) spare: bool,
+    /// Number of relays that the leader keeps in the chain: more than half of --of, at most all. While there are fewer,
+    /// it calls spares. Without this option a spare is called only before a departure. The same for all relays
+    #[arg(long, value_name = "N", requires = "shared", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
+    flying: Option<u16>,
+    /// Duration of the motion to newly agreed positions, s, 0 to 3600, at most four times --dead-after-ms. All drones
+    /// begin and arrive together, so that no hop is worse on the way. The same for all relays
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
+    respacing: f32,
 }
 
 impl BatteryOptions {
@@ -222,6 +230,25 @@ impl BatteryOptions {
         let full_s = self.flight_time.unwrap_or(f32::NAN);
         let is_needed = self.reserve.is_some() || self.flight_time.is_some();
         is_needed.then_some([full_s, self.return_speed, self.descent])
+    }
+
+    /// Checks the options of a fleet of `of` relays: `--flying` and `--respacing`.
+    fn check_fleet(&self, dead_after_ms: u64, of: u16) -> Result<(), String> {
+        let least = of / 2 + 1;
+        if let Some(flying) = self.flying.filter(|flying| !(least..=of).contains(flying)) {
+            return Err(format!(
+                "--flying {flying}: must be within {least} to {of}, more than half of --of"
+            ));
+        }
+        let most_ms = dead_after_ms.saturating_mul(4);
+        if micros(self.respacing) > Duration::from_millis(most_ms) {
+            return Err(format!(
+                "--respacing {}: must be within 0 to {} s, four times --dead-after-ms",
+                self.respacing,
+                most_ms / 1_000
+            ));
+        }
+        Ok(())
     }
 
     pub(crate) fn reserve(&self) -> Option<Duration> {
@@ -288,7 +315,7 @@ fn micros(seconds: f32) -> Duration {
     Duration::from_micros((f64::from(seconds) * 1e6) as u64)
 }
 
-/// Adds the options of the file's sections `[network]` and `[companion]`.
+/// Adds the options of the file's sections `[network]`, `[fleet]` and `[companion]`.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.companion;
@@ -308,6 +335,8 @@ fn section(deployment: &Deployment, given: &mut FileOptions) {
     given.value("--return-speed", own.return_speed_m_s);
     given.value("--descent", own.descent_m_s);
     given.flag("--spare", own.spare);
+    given.value("--flying", deployment.fleet.flying);
+    given.value("--respacing", deployment.fleet.respacing_s);
     given.path("--positions", own.positions.as_ref());
     given.value("--position-error", own.position_error_m);
     given.flag("--json", own.json);
@@ -332,6 +361,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
     }
     let has_source = options.positions.is_some() || options.autopilot.is_some();
     options.battery.check(options.dead_after_ms, has_source)?;
+    options.battery.check_fleet(options.dead_after_ms, of)?;
     let wiring = wiring(&options)?;
     let load = match wiring {
         Wiring::Pair => ChannelLoad::of_radios(1),
@@ -360,6 +390,8 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         hop_time: load.hop_time(options.baud, LATENCY),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),
+        flying: options.battery.flying.unwrap_or(0),
+        respacing: micros(options.battery.respacing),
         ..Settings::default()
     };
     let key = options.key_file.as_deref();

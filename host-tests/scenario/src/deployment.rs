@@ -1,7 +1,7 @@
 //! Settings of the programs in a chain, apart from the scenario: network, ports and files.
 //!
-//! They are the sections `[network]`, `[companion]` and `[ground]` of the scenario file. Tools that do not fly only
-//! check them.
+//! They are the sections `[network]`, `[fleet]`, `[companion]` and `[ground]` of the scenario file. Tools that do not
+//! fly only check them.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub const NETWORK: u16 = 1;
 /// Relative tolerance of the target SIR on companion computers. No option changes it.
 pub const COMPANION_TOLERANCE: f64 = 1e-4;
 
-/// Settings of the programs: sections `[network]`, `[companion]` and `[ground]` of a scenario file.
+/// Settings of the programs: sections `[network]`, `[fleet]`, `[companion]` and `[ground]` of a scenario file.
 ///
 /// If a value is `None`, the program uses its default.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -26,6 +26,8 @@ pub const COMPANION_TOLERANCE: f64 = 1e-4;
 pub struct Deployment {
     /// Section `[network]`: settings that all members of the network share.
     pub network: Network,
+    /// Section `[fleet]`: replacement of drones whose batteries run low.
+    pub fleet: Fleet,
     /// Section `[companion]`: the companion computer of one drone.
     pub companion: Companion,
     /// Section `[ground]`: the ground station.
@@ -50,6 +52,17 @@ pub struct Network {
     pub probe_after_ms: Option<u32>,
     /// Silence after which a neighbour counts as lost, ms, 1 to 3600000.
     pub dead_after_ms: Option<u32>,
+}
+
+/// Section `[fleet]` of a scenario file: replacement of drones whose batteries run low.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Fleet {
+    /// Number of relays that the leader keeps in the chain while spares wait, 1 to 1000. More than half of
+    /// `network.relays`, and at most all of them.
+    pub flying: Option<u16>,
+    /// Duration of the motion to newly agreed positions, s, 0 to 3600. At most four times `network.dead_after_ms`.
+    pub respacing_s: Option<f32>,
 }
 
 /// Section `[companion]` of a scenario file: the companion computer of one drone. Paths are relative to the file's
@@ -148,7 +161,7 @@ pub(super) fn split(mut table: Table) -> (Table, Table) {
     (table, sections)
 }
 
-/// Converts the `[network]`, `[companion]` and `[ground]` tables of a file to their types.
+/// Converts the `[network]`, `[fleet]`, `[companion]` and `[ground]` tables of a file to their types.
 ///
 /// [`check::table`] must have accepted the tables before.
 pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, ScenarioError> {

@@ -463,6 +463,7 @@ const SILENCE: Range = range(1.0, 3.6e6, "ms");
 
 pub(super) const SECTIONS: Keys = &[
     optional("network", Rule::Table(NETWORK)),
+    optional("fleet", Rule::Table(FLEET)),
     optional("companion", Rule::Table(COMPANION)),
     optional("ground", Rule::Table(GROUND)),
 ];
@@ -475,6 +476,11 @@ const NETWORK: Keys = &[
     optional("baud", Whole(BAUD)),
     optional("probe_after_ms", Whole(SILENCE)),
     optional("dead_after_ms", Whole(SILENCE)),
+];
+
+const FLEET: Keys = &[
+    optional("flying", Whole(range(1.0, 1_000.0, ""))),
+    optional("respacing_s", Number(range(0.0, 3_600.0, "s"))),
 ];
 
 const COMPANION: Keys = &[

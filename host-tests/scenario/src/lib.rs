@@ -69,7 +69,7 @@ impl Scenario {
 }
 
 impl deployment::Deployment {
-    /// Reads a scenario file: the scenario, and the settings in `[network]`, `[companion]` and `[ground]`.
+    /// Reads a scenario file: the scenario, and the settings in `[network]`, `[fleet]`, `[companion]` and `[ground]`.
     ///
     /// # Errors
     /// If [`Scenario::load`] rejects the file, if one of the three sections has a mistake, or if the numbers of relays
@@ -83,7 +83,7 @@ impl deployment::Deployment {
         Ok((scenario, sections))
     }
 
-    /// Parses only the settings in `[network]`, `[companion]` and `[ground]` of a scenario file.
+    /// Parses only the settings in `[network]`, `[fleet]`, `[companion]` and `[ground]` of a scenario file.
     ///
     /// Unlike [`Self::load`], it accepts a number of relays in `[network]` that differs from the number in `[plan]`.
     /// `file_name` is used only in error messages.

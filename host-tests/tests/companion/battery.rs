@@ -348,3 +348,38 @@ fn a_battery_that_does_not_outlast_its_reserve_is_refused() {
     let why = "--flight-time 360: must be above 360 s, the sum of --reserve 180 s and 180 s for the replacement of this relay";
     assert!(line.contains(why), "{line}");
 }
+
+/// Checks that the leader calls a spare without a request to leave while the chain has fewer relays than `--flying`.
+#[test]
+fn a_spare_is_called_while_the_chain_has_too_few_relays() {
+    let chain = Chain::on_channel(3, Medium::new(3, QUIET));
+    let members = [1, 2].map(|index| chain.relay(index, &format!("{PATIENT} --flying 3")));
+    let mut spare = chain.relay(3, &format!("{PATIENT} --flying 3 --spare"));
+    spare.line("departure: this relay waits outside of the chain as a spare");
+    spare.line("departure: this relay is a member of the chain, or joins it");
+    spare.line("agreed");
+    drop(members);
+}
+
+#[test]
+fn a_number_of_relays_and_a_motion_out_of_range_are_refused() {
+    let chain = Chain::on_channel(5, Medium::new(5, QUIET));
+    for (options, why) in [
+        (
+            "--flying 2",
+            "--flying 2: must be within 3 to 5, more than half of --of",
+        ),
+        (
+            "--flying 6",
+            "--flying 6: must be within 3 to 5, more than half of --of",
+        ),
+        (
+            "--respacing 6.5",
+            "--respacing 6.5: must be within 0 to 6 s, four times --dead-after-ms",
+        ),
+    ] {
+        let line =
+            Relay::start(&chain.arguments(1, &format!("{QUICK} {options}"))).refused_at_once(2);
+        assert!(line.contains(why), "{line}");
+    }
+}

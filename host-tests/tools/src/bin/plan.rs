@@ -1050,7 +1050,7 @@ fn write_out(
     })
 }
 
-/// Loads the sections `[network]`, `[companion]` and `[ground]` of the scenario file.
+/// Loads the sections `[network]`, `[fleet]`, `[companion]` and `[ground]` of the scenario file.
 ///
 /// It is an error if `[network]` has a number of relays other than `relays`.
 fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {

@@ -45,7 +45,7 @@ const FLOAT: u8 = 9;
 pub struct Bundle<'a> {
     /// Text of the scenario file, with a plan if the positions of the relays are known.
     pub text: String,
-    /// Sections `[network]`, `[companion]` and `[ground]` of the scenario file.
+    /// Sections `[network]`, `[fleet]`, `[companion]` and `[ground]` of the scenario file.
     pub deployment: &'a Deployment,
     /// Number of relays.
     pub uavs: u16,
