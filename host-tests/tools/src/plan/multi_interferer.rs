@@ -185,7 +185,7 @@ impl Planner<'_> {
     fn of_variants(&self, scene: &Scene) -> Vec<Vec<Place>> {
         let best = |variant: &Scenario| {
             let relays = u16::try_from(scene.relays.len()).ok()?;
-            let plan = altitude::best(variant, relays, self.ask.tolerance).ok()?;
+            let plan = altitude::in_flight(variant, relays, self.ask.tolerance).ok()?;
             Some(places(&plan))
         };
         self.variants().iter().filter_map(best).collect()
@@ -283,7 +283,7 @@ impl Candidates {
             // With different powers fewer relays may do better, so each smaller number is excluded.
             Some(target) if self.scene.reverse > 0.0 => (1..self.relays)
                 .rev()
-                .all(|fewer| source::is_excluded_both_ways(planner.scenario, fewer, target)),
+                .all(|fewer| source::is_excluded(planner.scenario, fewer, target)),
             // With fewer relays even the best chain misses the target.
             Some(_) => is_best,
             None => false,
