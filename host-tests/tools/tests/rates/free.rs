@@ -322,6 +322,57 @@ fn free_altitudes_against_several_interferers_both_ways() {
     println!("several interferers, free altitudes divided by common ones: worst {worst:.6}");
 }
 
+/// Checks plans against two interferers whose largest SIR was found by an independent optimiser.
+///
+/// The optimiser was SLSQP in f64 from many start chains. From the best chain on the line, each move of a single relay
+/// or of a part of the chain lowers the SIR.
+#[test]
+fn free_positions_against_two_interferers_near_the_best_known() {
+    let scenes = [
+        (
+            3,
+            [6.112, 33.58],
+            61.78,
+            [2.366, 67.25],
+            0.7576,
+            [[1.261, 1020.0, -127.2], [6.265, 402.7, -292.7]],
+            2.894_517,
+        ),
+        (
+            5,
+            [20.0, 107.1],
+            85.28,
+            [38.37, 79.78],
+            0.7058,
+            [[53.15, 1060.0, -117.7], [62.52, 748.9, 266.1]],
+            0.378_645,
+        ),
+    ];
+    for (relays, band_m, side_m, [tx_w, rx_w], reverse, sources, best_sir) in scenes {
+        let scenario = Scenario {
+            tx_w,
+            rx_w,
+            reverse,
+            min_separation_m: 0.0,
+            altitude_min_m: band_m[0],
+            altitude_m: band_m[0],
+            altitude_max_m: band_m[1],
+            lateral_min_m: -side_m,
+            lateral_max_m: side_m,
+            interference: Interference::Sources(
+                sources
+                    .map(|[power_w, x_m, y_m]| Source { power_w, x_m, y_m })
+                    .into(),
+            ),
+            ..Scenario::default()
+        };
+        let share = plan(&scenario, &request(relays, true)).unwrap().sir() / best_sir;
+        println!("two interferers, {relays} relays: {share:.6}");
+        // Relays keep positions for a hypothetical interferer that lose up to 1 %.
+        assert!(share > 0.99, "{share} in {scenario:?}");
+    }
+}
+
 /// Checks that free altitudes carry at least as much as the configured altitude.
 ///
 /// With equal slots and with channels.
