@@ -186,7 +186,7 @@ const BEYOND: [Recorded; 6] = [
     },
 ];
 
-/// Checks plans whose lateral range is narrow or missing on the side of the line opposite the interferer.
+/// Checks plans whose lateral range is narrow or missing on the side opposite the interferer.
 #[test]
 fn a_lateral_range_on_the_side_of_the_interferer() {
     for recorded in &BEYOND {

@@ -1,4 +1,4 @@
-//! Plans with the fewest relays for a target SIR: their SIRs in f64, and their positions between Tx and Rx.
+//! Plans with the fewest relays for a target SIR: SIRs in f64, and positions between Tx and Rx.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
