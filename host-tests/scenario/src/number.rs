@@ -1,4 +1,4 @@
-//! Conversion of numbers: f64 of files to f32 of relays, decibels to factors.
+//! Conversion of numbers: f64 of files to f32 of relays and back, decibels to factors.
 
 /// Returns the f32 nearest to `value`. Relays compute in f32.
 #[expect(
@@ -7,6 +7,14 @@
 )]
 pub fn narrow(value: f64) -> f32 {
     value as f32
+}
+
+/// Returns the f64 with the shortest decimal form that rounds to `value` in f32.
+///
+/// Files and reports then have short numbers.
+#[must_use]
+pub fn shortest(value: f32) -> f64 {
+    format!("{value}").parse().unwrap_or_else(|_| value.into())
 }
 
 /// Converts decibels `db` to a linear ratio of powers.

@@ -417,12 +417,13 @@ impl Room {
         }
     }
 
-    /// Returns the limit of the lateral offset, m, on the side of the line Tx-Rx opposite the interferer.
+    /// Returns the limit of the lateral offset, m, that is farther from the interferer.
     pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
-        if interferer.y_m > 0.0 {
-            self.lateral.least_m
+        let Band { least_m, most_m } = self.lateral;
+        if interferer.y_m > 0.5 * (least_m + most_m) {
+            least_m
         } else {
-            self.lateral.most_m
+            most_m
         }
     }
 

@@ -12,7 +12,7 @@ use super::attack::AttackReport;
 use super::hops::{HopSlots, LostReport, RelayReport, WorstBack, db, hop_sirs, hop_sirs_back};
 use super::rotation::RotationReport;
 use super::sensing::SensingReport;
-use super::timeline::{MomentReport, RecoveryReport, recoveries, seconds};
+use super::timeline::{MomentReport, RecoveryReport, counted, recoveries, seconds};
 use super::traffic::TrafficReport;
 use super::{hops, timeline};
 use crate::simulator::drones::{Point, apart, point};
@@ -270,7 +270,7 @@ impl ChainReport {
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
             _ = writeln!(
                 text,
-                "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} relays by `{}`",
+                "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} by `{}`",
                 self.relays_left(),
                 self.method
             );
@@ -369,8 +369,8 @@ impl ChainReport {
     /// Formats the number of relays in the chain: "8", or "6 of 8" if some are lost.
     fn relays_left(&self) -> String {
         match self.left {
-            Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),
-            _ => self.uavs.to_string(),
+            Some(left) if left < self.uavs => format!("{left} of {}", counted(self.uavs.into())),
+            _ => counted(self.uavs.into()),
         }
     }
 }

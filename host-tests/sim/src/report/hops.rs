@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay::optimiser::pass::Walk;
 use uav_relay::{Mission, Placement, Profile, SlotShares};
+use uav_relay_scenario::number::shortest;
 pub use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
 
 /// Returns the position that relay `index` takes if the chain meets the target SIR `target`, linear.
@@ -179,7 +180,7 @@ impl WorstBack {
     ///
     /// `None` if the mission requires no SIR from Rx to Tx, or if there are no hops.
     pub fn of(mission: &Mission, there: &[f64], back: &[f64]) -> Option<Self> {
-        let reverse = f64::from(mission.config().reverse);
+        let reverse = shortest(mission.config().reverse);
         if reverse > 0.0 {
             Self::with(reverse, there, back)
         } else {

@@ -15,5 +15,5 @@ pub use hops::{
     relays,
 };
 pub use sensing::SensingReport;
-pub use timeline::seconds;
+pub use timeline::{counted, seconds};
 pub use traffic::TrafficReport;

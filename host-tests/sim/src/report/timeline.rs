@@ -236,7 +236,10 @@ impl Group {
             "switched on" => format!("{who} switched on"),
             "lost" => format!("relay {other} lost"),
             "found" => format!("relays {relay} and {other} linked"),
-            "view accepted" => format!("chain of {}", count(one.relays.unwrap_or_default().into())),
+            "view accepted" => format!(
+                "chain of {}",
+                counted(one.relays.unwrap_or_default().into())
+            ),
             "converged" => one.sir.map_or_else(
                 || "relays spread evenly".to_owned(),
                 |sir| format!("SIR {sir:.3}"),
@@ -253,7 +256,7 @@ impl Group {
             "epoch went back" => format!("relay {other} has an old epoch"),
             "duplicate index" => format!("duplicate relay number {other}"),
             "engaged" | "released" if self.relays.len() > 1 => {
-                format!("{} {}", count(self.relays.len()), one.what)
+                format!("{} {}", counted(self.relays.len()), one.what)
             }
             "engaged" | "released" | "blind" => format!("{who} {}", one.what),
             "restarted" => format!("{who}: autopilot restarted"),
@@ -280,7 +283,7 @@ impl Group {
             "found" => format!("{who} became a neighbour of relay {other}"),
             "view accepted" => format!(
                 "membership agreed: {} (view {})",
-                count(one.relays.unwrap_or_default().into()),
+                counted(one.relays.unwrap_or_default().into()),
                 one.view.unwrap_or_default()
             ),
             "lease expired" => format!("{who}: last agreement on positions expired, setpoint kept"),
@@ -318,12 +321,12 @@ impl Group {
             "converged" if one.sir.is_none() => {
                 format!(
                     "{} spread evenly to measure the interference",
-                    count(self.relays.len())
+                    counted(self.relays.len())
                 )
             }
             "converged" => format!(
                 "positions agreed: {}, SIR {:.3}",
-                count(self.relays.len()),
+                counted(self.relays.len()),
                 one.sir.unwrap_or_default()
             ),
             "partition" => {
@@ -341,7 +344,7 @@ impl Group {
             "stored" => format!("{who} stored mission version {version}"),
             "adopted" => format!(
                 "mission version {version} adopted: {}",
-                count(self.relays.len())
+                counted(self.relays.len())
             ),
             _ => "no positions meet any target SIR, so the relays keep their positions".to_owned(),
         }
@@ -349,7 +352,7 @@ impl Group {
 }
 
 /// Formats a count: "1 relay", "8 relays".
-fn count(relays: usize) -> String {
+pub fn counted(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 

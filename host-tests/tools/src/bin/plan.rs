@@ -8,6 +8,7 @@ use uav_relay_scenario::deployment::{Companion, Deployment, agree};
 use uav_relay_scenario::link::{Access, BandwidthError, Radio};
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{Failure, number, whole};
+use uav_relay_sim::report::counted;
 use uav_relay_sim::svg::{Picture, lateral_view};
 use uav_relay_sim::{command, svg};
 use uav_relay_terrain::report::TerrainReport;
@@ -871,8 +872,12 @@ impl InFlight {
             None => line,
         });
         let problem = joined([blocked, no_fly(options, scenario, &flown.plan)]);
-        let problem = problem
-            .map(|line| format!("at the positions on which {relays} relays would agree, {line}"));
+        let problem = problem.map(|line| {
+            format!(
+                "at the positions on which {} would agree, {line}",
+                counted(relays.into())
+            )
+        });
         Ok(Self {
             own,
             flown,
@@ -982,8 +987,9 @@ fn write_out(
         && flown.plan.sir() < target * (1.0 - options.tolerance)
     {
         return Err(Failure::unmet(format!(
-            "--out {}: not written: {relays} relays would agree on positions with {sir:.2} dB, below the target of {:.2} dB; give a larger --uavs",
+            "--out {}: not written: {} would agree on positions with {sir:.2} dB, below the target of {:.2} dB; give a larger --uavs",
             file.display(),
+            counted(relays.into()),
             db(target)
         )));
     }
@@ -991,8 +997,9 @@ fn write_out(
         let rate_bps = Rate::of(&flown.plan, scenario, radio).worse(scenario.reverse);
         if rate_bps < target_bps * (1.0 - options.tolerance) {
             return Err(Failure::unmet(format!(
-                "--out {}: not written: the positions on which {relays} relays would agree carry {rate_bps:.6e} bit/s, below the target of {target_bps:.6e} bit/s; give a larger --uavs",
-                file.display()
+                "--out {}: not written: the positions on which {} would agree carry {rate_bps:.6e} bit/s, below the target of {target_bps:.6e} bit/s; give a larger --uavs",
+                file.display(),
+                counted(relays.into())
             )));
         }
     }
@@ -1035,7 +1042,13 @@ fn write_out(
     save(file, "--out", &text)?;
     let file = file.display().to_string();
     let text = format!(
-        "{file}: the scenario and its plan were written: {relays} relays that agree on positions with {sir:.3} dB; {}",
+        "{file}: the scenario and its plan were written: {} {} on positions with {sir:.3} dB; {}",
+        counted(relays.into()),
+        if relays == 1 {
+            "that agrees"
+        } else {
+            "that agree"
+        },
         next(
             &file,
             &sections,

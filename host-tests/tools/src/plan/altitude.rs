@@ -1,6 +1,6 @@
 //! Plans with free altitudes and lateral positions against one interferer, by the joint method.
 //!
-//! The positions are those that the relays agree on in flight.
+//! [`in_flight`] has the positions that the relays agree on in flight. [`best`] has better ones in some scenes.
 
 use core::task::Poll;
 
@@ -11,7 +11,7 @@ use uav_relay::optimiser::spacing::RequiredPosition;
 use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
-use super::{NoPlan, Plan, ProfiledMission, Why, source};
+use super::{LOSS, NoPlan, Plan, ProfiledMission, Why, source};
 use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::{Scenario, mission};
 
@@ -26,7 +26,7 @@ type Chain = Solver<MOST, { MOST / 10 }>;
 ///
 /// # Errors
 /// [`NoPlan`] if the scenario is not a valid mission, or for fitted slots with a table of rate steps.
-pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+pub(super) fn in_flight(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let mut briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     briefed.mission = mission::with_access(scenario, &briefed.mission)?;
     match joint(&briefed) {
@@ -45,6 +45,37 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     }
 }
 
+/// Name of the method that found positions for one direction with the solver for both directions.
+pub(super) const BY_BOTH: &str =
+    "the joint method with the solver for both directions (link.reverse = 1e-6)";
+
+/// Ratio `reverse` with which the solver for both directions finds positions for one direction.
+const HARDLY: f64 = 1e-6;
+
+/// Returns the better one of two plans of the joint method for the data of `scenario`.
+///
+/// The first plan is [`in_flight`]. For one direction the second plan is that of the solver for both directions, with a
+/// required SIR toward Tx that is almost 0. Both solvers find local optima, from different initial chains.
+///
+/// # Errors
+/// [`NoPlan`] for the same reasons as [`in_flight`].
+pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+    let own = in_flight(scenario, relays, tolerance)?;
+    if scenario.reverse > 0.0 || own.mission.fitted_gap() > 0.0 {
+        return Ok(own);
+    }
+    let other = Scenario {
+        reverse: HARDLY,
+        ..scenario.clone()
+    };
+    let Some(places) = joint(&ProfiledMission::new(&other, relays, tolerance)?) else {
+        return Ok(own);
+    };
+    let plan = ProfiledMission::new(scenario, relays, tolerance)?.plan(&places, BY_BOTH, false);
+    let is_better = plan.sir() > own.sir() * (1.0 + LOSS);
+    Ok(if is_better { plan } else { own })
+}
+
 /// Number of bisection steps that find the ratio of SIRs for the largest data rate.
 const RATIO_STEPS: u8 = 8;
 
@@ -57,7 +88,7 @@ const RATIO_STEPS: u8 = 8;
 /// for the ratio r.
 ///
 /// # Errors
-/// [`NoPlan`] for the same reasons as [`best`].
+/// [`NoPlan`] for the same reasons as [`in_flight`].
 pub(super) fn best_for_rate(
     scenario: &Scenario,
     relays: u16,
@@ -65,7 +96,7 @@ pub(super) fn best_for_rate(
     radio: &Radio,
 ) -> Result<Plan, NoPlan> {
     let reverse = scenario.reverse;
-    let mut best = best(scenario, relays, tolerance)?;
+    let mut best = in_flight(scenario, relays, tolerance)?;
     // Rates to Rx, and back divided by r, while a hop transmits.
     let worst_bps = |sirs: &[f64]| {
         let worst = sirs.iter().copied().reduce(f64::min);

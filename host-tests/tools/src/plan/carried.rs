@@ -150,8 +150,9 @@ impl<'a> Carried<'a> {
             "Algorithm 1 for the data rates of both directions"
         };
         let plan = briefed.plan(&places, how, false);
-        let sirs = scene.hop_sirs(&places);
-        let back = WorstBack::of(&plan.mission, &sirs, &scene.hop_sirs_back(&places));
+        let chain = plan.chain();
+        let sirs = scene.hop_sirs(&chain);
+        let back = WorstBack::of(&plan.mission, &sirs, &scene.hop_sirs_back(&chain));
         Ok(Plan { sirs, back, ..plan })
     }
 

@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
+use uav_relay_scenario::number::shortest;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Scenario, mission};
 
@@ -27,6 +28,8 @@ pub struct Flown {
     pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
+    /// True if the best positions are those of the solver for both directions, in a plan for one direction.
+    pub by_both: bool,
 }
 
 impl Flown {
@@ -55,6 +58,11 @@ impl Flown {
                     "let the relays estimate the interferer ([listen]; `cargo chain --listen` simulates it), or plan other altitudes or more \
                      relays for the sum of all interferers (`cargo plan`)"
                 },
+            )
+        } else if self.by_both {
+            (
+                "because their solver for one direction ends at another local optimum",
+                "set link.reverse to 1e-6: relays then compute with the solver for both directions",
             )
         } else {
             (
@@ -102,6 +110,7 @@ pub fn flown(
         best_sir,
         rates,
         stand_in: mission::hypothetical(scenario).is_some(),
+        by_both: best.how == altitude::BY_BOTH,
     })
 }
 
@@ -115,7 +124,7 @@ pub(super) fn alone(
     tolerance: f64,
 ) -> Result<Plan, NoPlan> {
     let by_method = |scenario: &Scenario| match method {
-        PlannedMethod::Joint => altitude::best(scenario, relays, tolerance),
+        PlannedMethod::Joint => altitude::in_flight(scenario, relays, tolerance),
         PlannedMethod::Align => source::best(scenario, relays, tolerance),
     };
     let Some(one) = mission::hypothetical(scenario) else {
@@ -157,13 +166,6 @@ pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned 
         sir_db: (10.0 * flown.plan.sir().log10() * 1e6).round() / 1e6,
         places,
     }
-}
-
-/// Returns the f64 with the shortest decimal form that rounds to `value` in f32.
-///
-/// Files then have short numbers.
-pub(super) fn shortest(value: f32) -> f64 {
-    format!("{value}").parse().unwrap_or_else(|_| value.into())
 }
 
 /// Returns the scenario file `text` with the section `[plan]` at its end, which replaces an old one.

@@ -38,9 +38,10 @@ use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;
 use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::mission::Refusal;
+use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, mission};
-use uav_relay_sim::report::{WorstBack, hop_sirs, hop_sirs_back};
+use uav_relay_sim::report::{WorstBack, counted, hop_sirs, hop_sirs_back};
 
 pub use altitude::solved;
 
@@ -237,7 +238,8 @@ impl Why {
                 let (target, most) = (unit.asked(*target), unit.say(*most));
                 match relays {
                     Some(relays) => format!(
-                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR is {most}, with {relays} relays"
+                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR is {most}, with {}",
+                        counted(usize::from(*relays))
                     ),
                     None => format!(
                         "none of the tried numbers of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR found is {most}"
@@ -392,14 +394,23 @@ struct ProfiledMission {
     mission: Mission,
     own: Vec<(u16, Profile)>,
     held: Vec<u16>,
+    /// x of Rx, m, rounded down: relays are never beyond Rx.
+    end_m: f32,
 }
 
 impl ProfiledMission {
     fn new(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Self, NoPlan> {
         let (mission, own) = mission::mission(scenario, relays, tolerance)?;
+        let distance_m = narrow(scenario.distance_m);
+        let end_m = if f64::from(distance_m) > scenario.distance_m {
+            distance_m.next_down()
+        } else {
+            distance_m
+        };
         Ok(Self {
             mission,
             own,
+            end_m,
             held: mission::fixed_altitude_relays(scenario, relays),
         })
     }
@@ -427,7 +438,11 @@ impl ProfiledMission {
                     altitude_m: place.altitude_m,
                     ..self.profile(index)
                 };
-                (*place, profile)
+                let place = Placement {
+                    x_m: place.x_m.min(self.end_m),
+                    ..*place
+                };
+                (place, profile)
             })
             .collect();
         let sirs = hop_sirs(&self.mission, &held);

@@ -133,7 +133,7 @@ impl Planner<'_> {
             return at(scene, x_m);
         }
         if let Some(radio) = &self.radio {
-            return self.by_moves(Some(radio), scene, start);
+            return self.by_moves(Some(radio), scene, start.map(places).into_iter().collect());
         }
         if scene.reverse > 0.0 {
             let at_own = both_ways(scene, start, self.ask.tolerance);
@@ -144,7 +144,10 @@ impl Planner<'_> {
                 proven: false,
                 ..best
             });
-            let free = self.by_moves(None, scene, start);
+            let own = unproven.iter().map(|best| best.places.as_slice());
+            let starts = own.map(|places| places.iter().map(|&at| at.into()).collect());
+            let starts: Vec<Vec<Place>> = starts.chain(start.map(places)).collect();
+            let free = self.by_moves(None, scene, starts);
             let all = unproven.into_iter().chain(free);
             return all.max_by(|a, b| a.value.total_cmp(&b.value));
         }
@@ -185,16 +188,22 @@ impl Planner<'_> {
     fn of_variants(&self, scene: &Scene) -> Vec<Vec<Place>> {
         let best = |variant: &Scenario| {
             let relays = u16::try_from(scene.relays.len()).ok()?;
-            let plan = altitude::best(variant, relays, self.ask.tolerance).ok()?;
+            let plan = altitude::in_flight(variant, relays, self.ask.tolerance).ok()?;
             Some(places(&plan))
         };
         self.variants().iter().filter_map(best).collect()
     }
 
     /// Returns the chain with the largest value ([`merit`]) found by moves from several start chains.
-    fn by_moves(&self, radio: Option<&Radio>, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
-        let mut starts = self.of_variants(scene);
-        starts.extend(start.map(places));
+    ///
+    /// The start chains are `starts`, and those of [`Planner::of_variants`].
+    fn by_moves(
+        &self,
+        radio: Option<&Radio>,
+        scene: &Scene,
+        mut starts: Vec<Vec<Place>>,
+    ) -> Option<Best> {
+        starts.extend(self.of_variants(scene));
         starts.sort_by(|a, b| {
             let [a, b] = [a, b].map(|start| merit(radio, scene, start));
             b.total_cmp(&a)
@@ -283,7 +292,7 @@ impl Candidates {
             // With different powers fewer relays may do better, so each smaller number is excluded.
             Some(target) if self.scene.reverse > 0.0 => (1..self.relays)
                 .rev()
-                .all(|fewer| source::is_excluded_both_ways(planner.scenario, fewer, target)),
+                .all(|fewer| source::is_excluded(planner.scenario, fewer, target)),
             // With fewer relays even the best chain misses the target.
             Some(_) => is_best,
             None => false,
@@ -386,10 +395,50 @@ const GAIN: f64 = 1e-4;
 /// Rounding error allowed in the distance of two relays, as a fraction of the distance Tx-Rx.
 const ROUNDING: f64 = 2e-7;
 
-/// Returns the chain `start` after moves that raise its value ([`merit`]).
+/// Factors of the levels in the smooth minimum of the hops' levels, in ln(SIR), in order of use.
+const SHARPNESS: [f64; 4] = [8.0, 40.0, 200.0, 1000.0];
+
+/// Returns the best of the chain `start` and of chains that moves of its relays lead to.
+///
+/// In a chain with a large SIR most hops have equal SIRs, and each move of a few relays lowers one of them. Without a
+/// `radio` the moves therefore first raise smooth minima of the SIRs, each closer to the minimum than the one before.
+fn moved(radio: Option<&Radio>, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
+    let value = |places: &[Place]| merit(radio, scene, places);
+    let plain = climbed(scene, start.clone(), value);
+    if radio.is_some() {
+        return plain;
+    }
+    let mut places = start;
+    for sharpness in SHARPNESS {
+        places = climbed(scene, places, |places| smooth(scene, places, sharpness));
+    }
+    let places = climbed(scene, places, value);
+    if value(&places) > value(&plain) {
+        places
+    } else {
+        plain
+    }
+}
+
+/// Returns a smooth function that is slightly below the SIR of the worst hop, linear.
+fn smooth(scene: &Scene, places: &[Place], sharpness: f64) -> f64 {
+    let mut sirs = scene.hop_sirs(places);
+    if scene.reverse > 0.0 {
+        let back = scene.hop_sirs_back(places).into_iter();
+        sirs.extend(back.map(|sir| sir / scene.reverse));
+    }
+    let least = sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
+    if !(least > 0.0) {
+        return 0.0;
+    }
+    let sum: f64 = sirs.iter().map(|sir| (sir / least).powf(-sharpness)).sum();
+    least * sum.powf(-1.0 / sharpness)
+}
+
+/// Returns the chain `start` after moves that raise its `value`.
 ///
 /// A move shifts relay k, or relays 1 to k, or relays k to N, along one coordinate.
-fn moved(radio: Option<&Radio>, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
+fn climbed(scene: &Scene, start: Vec<Place>, value: impl Fn(&[Place]) -> f64) -> Vec<Place> {
     let (d, band) = (scene.distance_m, scene.band);
     let shifted = |at: Place, holds: bool, axis: usize, by: f64| match axis {
         0 => Place {
@@ -410,13 +459,13 @@ fn moved(radio: Option<&Radio>, scene: &Scene, start: Vec<Place>) -> Vec<Place> 
     let is_apart = |places: &[Place]| {
         places.windows(2).all(|pair| match pair {
             [a, b] => {
-                a.x < b.x && libm::hypot(libm::hypot(b.x - a.x, b.y - a.y), b.h - a.h) >= least
+                a.x <= b.x && libm::hypot(libm::hypot(b.x - a.x, b.y - a.y), b.h - a.h) >= least
             }
             _ => false,
         })
     };
     let count = start.len();
-    let mut best = (merit(radio, scene, &start), start);
+    let mut best = (value(&start), start);
     let [mut width, last] = MOVES.map(|width| width * d);
     while width > last {
         let before = best.0;
@@ -427,9 +476,9 @@ fn moved(radio: Option<&Radio>, scene: &Scene, start: Vec<Place>) -> Vec<Place> 
                 for (place, relay) in own.take(group.end).skip(group.start) {
                     *place = shifted(*place, relay.holds, axis, by);
                 }
-                let value = merit(radio, scene, &places);
-                if value > best.0 && is_apart(&places) {
-                    best = (value, places);
+                let now = value(&places);
+                if now > best.0 && is_apart(&places) {
+                    best = (now, places);
                 }
             }
         }

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::{Noise, Scenario};
-use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, db, hops_table, relays};
+use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, counted, db, hops_table, relays};
 use uav_relay_terrain::report::TerrainReport;
 
 use super::area::AreaReport;
@@ -192,7 +192,8 @@ impl RateReport {
         let (relays, verb) = relays_carry(best_uavs);
         let other = self.relays;
         let fewer = if best_uavs < other {
-            format!(", more than {other} relays do")
+            let do_so = if other == 1 { "does" } else { "do" };
+            format!(", more than {} {do_so}", counted(other.into()))
         } else {
             String::new()
         };

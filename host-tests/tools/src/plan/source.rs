@@ -30,9 +30,9 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
         || scenario.reverse > 0.0
             && (1..relays)
                 .rev()
-                .all(|fewer| is_excluded_both_ways(scenario, fewer, target));
+                .all(|fewer| is_excluded(scenario, fewer, target));
     Ok(Plan {
-        most: most.ok().map(|best| best.sir()),
+        most: most.ok().map(|best| best.sir().max(plan.sir())),
         proven,
         ..plan
     })
@@ -63,7 +63,7 @@ pub(super) fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Pla
 /// Returns true if it is proven that no positions of `relays` relays meet `target` toward Rx and Tx.
 ///
 /// The proof shares no code with Algorithm 1, whose result it confirms.
-pub(super) fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
+pub(super) fn is_excluded(scenario: &Scenario, relays: u16, target: f64) -> bool {
     let targets = Targets {
         there: target,
         back: scenario.reverse * target,
@@ -81,7 +81,7 @@ pub(super) fn best_both_ways(
 ) -> Result<Plan, NoPlan> {
     let plan = best(scenario, relays, tolerance)?;
     let more = plan.sir() * (1.0 + 2.0 * tolerance);
-    let proven = is_excluded_both_ways(scenario, relays, more);
+    let proven = is_excluded(scenario, relays, more);
     Ok(Plan { proven, ..plan })
 }
 
@@ -226,9 +226,12 @@ pub(super) fn placed(briefed: &ProfiledMission, target: f32) -> Option<Vec<Place
     fewest::places(&briefed.mission, target, |index| briefed.profile(index))
 }
 
+/// Largest number of relays that are added if rounding errors make the fewest relays miss the target.
+const ADDED: u16 = 2;
+
 /// Returns the plan with the fewest relays that give every hop the SIR `target`.
 ///
-/// The relays keep their altitudes. `how` names the method.
+/// The relays keep their altitudes. `how` names the method. The SIRs of the plan, in f64, are at least `target`.
 pub(super) fn fewest(
     scenario: &Scenario,
     target: f64,
@@ -236,9 +239,63 @@ pub(super) fn fewest(
     how: &'static str,
 ) -> Result<Plan, NoPlan> {
     let (briefed, proven) = enough(scenario, target, tolerance)?;
-    let places = placed(&briefed, narrow(target)).ok_or_else(nothing)?;
-    Ok(briefed.plan(&places, how, proven))
+    let relays = briefed.mission.relays();
+    for number in relays..=relays.saturating_add(ADDED).min(Mission::MAX_RELAYS) {
+        if let Some(plan) = meeting(scenario, number, target, tolerance)? {
+            let proven = if number == relays {
+                proven
+            } else {
+                (1..number)
+                    .rev()
+                    .all(|fewer| is_excluded(scenario, fewer, target))
+            };
+            return Ok(Plan {
+                how,
+                proven,
+                ..plan
+            });
+        }
+    }
+    let most = best(scenario, relays, tolerance)?.sir();
+    let why = Why::Short {
+        target,
+        most,
+        relays: None,
+    };
+    Err(NoPlan::Unmet(why, Some(most)))
 }
+
+/// Largest number of trials with a raised target in [`meeting`].
+const TRIALS: u8 = 8;
+
+/// Returns a plan of `relays` relays whose SIRs in f64 are at least `target`; `None` if there is none.
+///
+/// The positions are computed in f32, so their SIRs are up to some 1e-6 below the SIR that they are computed for. This
+/// SIR is therefore raised a little.
+fn meeting(
+    scenario: &Scenario,
+    relays: u16,
+    target: f64,
+    tolerance: f64,
+) -> Result<Option<Plan>, NoPlan> {
+    let mut aim = target;
+    for _ in 0..TRIALS {
+        let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
+        let Some(places) = placed(&briefed, narrow(aim)) else {
+            break;
+        };
+        let plan = briefed.plan(&places, "", false);
+        if plan.sir() >= target {
+            return Ok(Some(plan));
+        }
+        aim *= (target / plan.sir()).max(1.0 + f64::from(f32::EPSILON));
+    }
+    let best = best(scenario, relays, LEAST_TOLERANCE)?;
+    Ok((best.sir() >= target).then_some(best))
+}
+
+/// Smallest relative tolerance on the SIR in requests to the planner.
+const LEAST_TOLERANCE: f64 = 1e-6;
 
 /// Returns the mission of the fewest relays that give every hop the SIR `target`.
 ///
@@ -313,7 +370,7 @@ pub(super) fn plan_in_field(scenario: &Scenario, ask: &PlanRequest) -> Result<Pl
             let plan = fewest(scenario, target, ask.tolerance, "Problem 1")?;
             let most = best_in_field(scenario, plan.mission.relays(), ask.tolerance);
             Ok(Plan {
-                most: most.ok().map(|best| best.sir()),
+                most: most.ok().map(|best| best.sir().max(plan.sir())),
                 ..plan
             })
         }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::{Duration, Method, Placement};
 use uav_relay_scenario::area::NoFly;
+use uav_relay_scenario::number::shortest;
 use uav_relay_scenario::{PlannedMethod, Scenario, mission};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
@@ -20,7 +21,7 @@ use uav_relay_terrain::profile::Ground;
 use uav_relay_terrain::room::{Limits, rooms};
 
 use super::area::{entered, range};
-use super::flown::{alone, shortest};
+use super::flown::alone;
 use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
 use super::terrain::Elevation;
 use super::{NoPlan, Plan, ProfiledMission, source};

@@ -8,6 +8,7 @@ mod command;
 mod free;
 mod judge;
 mod one;
+mod target;
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};

@@ -35,8 +35,8 @@ const OFF: [f32; 2] = [0.02, 0.002];
 /// Description of an initial chain. The first relay is the one next to the end (Tx or Rx) with more power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offsets of the first, the middle and the last relay. They are fractions of the largest permitted offset
-    /// on the side of the line Tx-Rx opposite the interferer.
+    /// Lateral offsets of the first, the middle and the last relay. They are fractions of the permitted limit that is
+    /// farther from the interferer.
     aside: [f32; 3],
     /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
     up: [f32; 2],
