@@ -419,6 +419,24 @@ fn a_slow_reader_is_dropped_and_the_memory_stays_bounded() {
     drop(slow);
 }
 
+/// Checks that a browser that reads nothing is dropped although it would take long to fill the system's send buffer.
+#[test]
+fn a_slow_reader_of_few_snapshots_is_dropped() {
+    let screen = Arc::new(started());
+    let mut slow = events(&screen);
+    let flight = Flight::begin(&screen, Duration::from_millis(400));
+    until(&mut slow, 0.0);
+    let begun = Instant::now();
+    while screen.connections() > 0 {
+        let took = begun.elapsed();
+        assert!(took < Duration::from_secs(30), "still connected");
+        thread::sleep(Duration::from_millis(100));
+    }
+    println!("a slow reader is dropped after {:?}", begun.elapsed());
+    flight.end("a slow reader of few snapshots");
+    drop(slow);
+}
+
 #[test]
 fn an_address_that_cannot_be_bound_is_named() {
     let screen = started();
