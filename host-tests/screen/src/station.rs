@@ -157,7 +157,10 @@ impl Known {
             self.detailed_at = report.at;
         }
         let is_unleased = report.agreed.is_some() && !report.holds_lease;
-        self.unleased_at = is_unleased.then(|| self.unleased_at.unwrap_or(report.at));
+        // After a restart the stored agreed position is not the relay's, until a report with details arrives.
+        let has_restarted = age >= UNSURE_AFTER && before.control != report.control;
+        let unleased_at = self.unleased_at.filter(|_| !has_restarted);
+        self.unleased_at = is_unleased.then(|| unleased_at.unwrap_or(report.at));
         let known = self.nearest.filter(|_| before.setpoint == report.setpoint);
         let way_m = distance_to_fly_m(&report).filter(|it| *it > NEAR_M);
         self.nearest = way_m.map(|it| match known {

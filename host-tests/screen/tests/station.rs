@@ -136,6 +136,10 @@ impl Watched {
             "unlocated" => report.position = None,
             "expired" => report.holds_lease = false,
             "restarted" => (report.agreed, report.setpoint) = (None, None),
+            "rebooted" => {
+                (report.control, report.holds_lease) = (Some(State::Standby), false);
+                report.version = None;
+            }
             "brief" => {
                 (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
                 report.version = None;
