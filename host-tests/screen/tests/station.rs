@@ -435,6 +435,24 @@ fn a_relay_whose_frames_are_received_is_not_lost_before_15_s() {
     assert!(second(&mut watched).contains("relay 3 lost: reported by relay 2"));
 }
 
+/// Checks that the text of an ended alarm names all relays that have reported it, not only the last one.
+#[test]
+fn an_ended_alarm_names_all_its_relays() {
+    let mut watched = Watched::new();
+    watched.second();
+    watched.changes("12:noquorum");
+    watched.second();
+    watched.changes("1:ok 4:noquorum");
+    watched.second();
+    let lasting = "1 Critical no quorum: relays 2 and 4 cannot reach enough relays, position held";
+    assert_eq!(watched.lasting(), lasting);
+    watched.changes("24:ok");
+    watched.second();
+    assert_eq!(watched.lasting(), ".");
+    let text = "no quorum: relays 1, 2 and 4 cannot reach enough relays, position held";
+    assert_eq!(watched.last.alarms[0].text, text);
+}
+
 /// Checks that a neighbour's outdated report does not mark a relay as lost.
 ///
 /// A report is outdated if the neighbour sent it before the lost relay's last report.
