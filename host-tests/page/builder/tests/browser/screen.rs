@@ -228,6 +228,7 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     let shown = Shown::begin(|| {
         let mut snapshot = full(5, 0.0);
         snapshot.relays[0].position.as_mut().unwrap().y_m = -0.04;
+        snapshot.relays[0].agreed.as_mut().unwrap().y_m = -0.04;
         snapshot.relays[2].position = None;
         snapshot.relays[4].agreed.as_mut().unwrap().altitude_m = None;
         snapshot.hops[1].sir_db = Some(8.0);
