@@ -55,6 +55,11 @@ const REQUEST_TIME: Duration = Duration::from_secs(5);
 /// Time within which a browser has to receive one file or one snapshot.
 const WRITE_TIME: Duration = Duration::from_secs(10);
 
+/// Time without any received byte after which the system ends the connection of a browser with the stream of snapshots.
+///
+/// It begins when the browser's receive buffer is full.
+const UNREAD_TIME: Duration = Duration::from_secs(20);
+
 /// Time for which the server reads and ignores the rest of a request after its answer.
 ///
 /// Otherwise unread bytes would reset the connection before the answer arrives at the browser.
@@ -697,12 +702,12 @@ fn read_some(stream: &mut TcpStream, bytes: &mut [u8], until: Instant) -> io::Re
     stream.read(bytes)
 }
 
-/// Lets the system end the connection if the browser receives nothing for [`WRITE_TIME`].
+/// Lets the system end the connection if the browser receives nothing for [`UNREAD_TIME`].
 ///
 /// Writing alone would notice it once the system's send buffer is full, which takes small snapshots many minutes.
 #[cfg(target_os = "linux")]
 fn end_if_unread(stream: &TcpStream) {
-    let millis = u32::try_from(WRITE_TIME.as_millis()).unwrap_or(u32::MAX);
+    let millis = u32::try_from(UNREAD_TIME.as_millis()).unwrap_or(u32::MAX);
     _ = rustix::net::sockopt::set_tcp_user_timeout(stream, millis);
 }
 
