@@ -158,7 +158,7 @@ fn a_lost_relay_is_an_alarm_in_time_although_frames_are_lost() {
             let mut flight = Flight::new(seed, loss, vec![(relay, killed)], s(150));
             let (lost, silent) = (format!("relay {relay} lost"), format!("relay {relay}: no"));
             let is_its = |it: &Alarm| it.text.starts_with(&lost) || it.text.starts_with(&silent);
-            while !flight.step().iter().any(|it| is_its(it)) || flight.now < killed {
+            while !flight.step().iter().any(is_its) || flight.now < killed {
                 assert!(flight.now < s(149), "relay {relay}, loss {loss}: no alarm");
             }
             took_s.push(seconds(flight.now.since(killed)));
