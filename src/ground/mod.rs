@@ -588,9 +588,9 @@ impl Ground {
         _ = self.watching.request(now, self.node.into());
     }
 
-    /// Returns the node numbers of the relays that have sent a frame to any node since the last call, nearest first.
+    /// Returns the numbers of the relays of which frames have arrived since the last call, nearest first.
     ///
-    /// Only the eight nearest relays count, and only frames that the station has received. Frames to other nodes are not
+    /// Frames to any node count. Only the eight nearest relays count, and only frames that the station has received. Frames to other nodes are not
     /// verified: anyone can send them. Work: eight relays at most.
     pub fn poll_overheard(&mut self) -> impl Iterator<Item = u16> {
         let seen = core::mem::take(&mut self.watching.seen);

@@ -55,9 +55,9 @@ const REQUEST_TIME: Duration = Duration::from_secs(5);
 /// Time within which a browser has to receive one file or one snapshot.
 const WRITE_TIME: Duration = Duration::from_secs(10);
 
-/// Time without any received byte after which the system ends the connection of a browser with the stream of snapshots.
+/// Time without any received byte after which the system ends the connection of a browser.
 ///
-/// It begins when the browser's receive buffer is full.
+/// It applies to the stream of snapshots. It begins when the browser's receive buffer is full.
 const UNREAD_TIME: Duration = Duration::from_secs(20);
 
 /// Time for which the server reads and ignores the rest of a request after its answer.

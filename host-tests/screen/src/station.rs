@@ -42,9 +42,9 @@ const UNSURE_AFTER: Duration = Duration::from_millis(2_500);
 /// The reports of relays farther away from the station then arrive again.
 const CLOSED_AFTER: Duration = SILENT_AFTER.times(2);
 
-/// Age of a relay's newest report from which only a silence of the whole chain delays the alarm that the relay is silent.
+/// Age of a relay's newest report from which the alarm that the relay is silent is no longer delayed.
 ///
-/// Before, received frames of the relay delay it, and silent relays on the way of its reports. The frames are not
+/// Only a silence of the whole chain still delays it. Before, received frames of the relay delay it, and silent relays on the way of its reports. The frames are not
 /// verified, and with lost frames some relay on the way is always silent: without a limit, they could hide a loss.
 const OVERDUE_AFTER: Duration = SILENT_AFTER.times(3);
 
@@ -184,7 +184,9 @@ impl Known {
         usual.clamp(SILENT_AFTER, SILENT_AFTER.times(2))
     }
 
-    /// Returns true if the drone has come no nearer to its setpoint for [`STUCK_AFTER`], and still has this setpoint.
+    /// Returns true if the drone has come no nearer to its setpoint for [`STUCK_AFTER`].
+    ///
+    /// A report of this time must have confirmed the setpoint.
     fn is_stuck(&self) -> bool {
         let is_long = |(at, _)| {
             self.report.at.since(at) >= STUCK_AFTER && self.detailed_at.since(at) >= CONFIRMED_AFTER
@@ -229,7 +231,7 @@ pub struct StationView {
     /// The key of the outer map is the silent relay, the key of the inner map the neighbour.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     refused: BTreeMap<(Reason, u16), Refused>,
-    /// Times of the last frames that the station has received of its nearest relays, whatever their destination.
+    /// Times of the last frames that the station has received of its nearest relays, to any node.
     overheard: BTreeMap<u16, Instant>,
     /// Lost relays that an operator has cleared from the display, with the time of each command.
     cleared: BTreeMap<u16, Instant>,

@@ -427,7 +427,7 @@ fn a_slow_reader_is_dropped_and_the_memory_stays_bounded() {
     drop(slow);
 }
 
-/// Checks that a browser that reads nothing is dropped although it would take long to fill the system's send buffer.
+/// Checks that a browser that reads nothing is dropped before the system's send buffer is full.
 #[test]
 fn a_slow_reader_of_few_snapshots_is_dropped() {
     let screen = Arc::new(started());

@@ -399,7 +399,9 @@ fn a_silent_relay_next_to_tx_or_rx_is_lost_once_its_neighbour_is_the_last_one() 
     }
 }
 
-/// Checks that frames of a relay prevent the alarm about its missing reports for 15 s, and not an alarm of a neighbour.
+/// Checks that frames of a relay prevent the alarm about its missing reports for 15 s.
+///
+/// They do not prevent the alarm that a neighbour reports.
 #[test]
 fn a_relay_whose_frames_are_received_is_not_lost_before_15_s() {
     let mut watched = Watched::new();
@@ -435,7 +437,7 @@ fn a_relay_whose_frames_are_received_is_not_lost_before_15_s() {
     assert!(second(&mut watched).contains("relay 3 lost: reported by relay 2"));
 }
 
-/// Checks that the text of an ended alarm names all relays that have reported it, not only the last one.
+/// Checks that the text of an ended alarm names all relays that have reported it.
 #[test]
 fn an_ended_alarm_names_all_its_relays() {
     let mut watched = Watched::new();

@@ -88,7 +88,7 @@ struct Own {
     alarmed_at: Option<Instant>,
 }
 
-/// Counts the false alarms of a flight without faults from `span[0]` on, by their texts without numbers.
+/// Counts the false alarms of a flight without faults from `span[0]` on, by their texts.
 ///
 /// An alarm about a lease or a quorum is true if a relay is in that state.
 fn false_alarms(seed: u64, loss: f64, span: [Instant; 2]) -> BTreeMap<String, u32> {
@@ -147,7 +147,7 @@ fn lost_frames_raise_few_false_alarms() {
     }
 }
 
-/// Checks that the alarm of a lost relay is not delayed by the frames that the station has received of it before.
+/// Checks that lost frames delay the alarm of a lost relay by 10 s at most.
 #[test]
 fn a_lost_relay_is_an_alarm_in_time_although_frames_are_lost() {
     // Usually the alarm takes 5 s. With losses the station waits for up to 15 s after the last report.
