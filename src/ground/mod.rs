@@ -590,11 +590,12 @@ impl Ground {
 
     /// Returns the numbers of the relays of which frames have arrived since the last call, nearest first.
     ///
-    /// Frames to any node count. Only the eight nearest relays count, and only frames that the station has received. Frames to other nodes are not
-    /// verified: anyone can send them. Work: eight relays at most.
+    /// Frames to any node count, but only those of the eight nearest relays. Frames to other nodes are not verified:
+    /// anyone can send them. Work: eight relays at most.
     pub fn poll_overheard(&mut self) -> impl Iterator<Item = u16> {
         let seen = core::mem::take(&mut self.watching.seen);
-        let distances = (1..=self.watching.all).filter(move |it| seen & bit(*it) != 0);
+        let near = 1..=STATION_REACH.min(self.watching.all);
+        let distances = near.filter(move |it| seen & bit(*it) != 0);
         distances.map(|distance| self.at(distance))
     }
 
