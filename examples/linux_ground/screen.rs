@@ -153,6 +153,7 @@ impl Web {
             received: stats.received.saturating_add(stats.handshakes),
             rejected: ground.refused(),
         };
+        self.view.overhear(now, ground.poll_overheard());
         let arrived = std::mem::take(&mut self.arrived);
         let mut snapshot = self.view.snapshot(now, &chain, &arrived, frames);
         let shown = is_known.then(|| name_of(version, upload.as_ref()));

@@ -270,6 +270,7 @@ impl Ground {
                 let header = frame.header;
                 let distance = header.sender.abs_diff(self.node);
                 self.watching.overheard |= bit(distance);
+                self.watching.seen |= bit(distance);
                 if header.destination != self.node {
                     bump(&mut self.stats.overheard);
                 } else if (1..=self.watching.reach).contains(&distance) {
@@ -587,6 +588,17 @@ impl Ground {
         _ = self.watching.request(now, self.node.into());
     }
 
+    /// Returns the numbers of the relays of which frames have arrived since the last call, nearest first.
+    ///
+    /// Frames to any node count, but only those of the eight nearest relays. Frames to other nodes are not verified:
+    /// anyone can send them. Work: eight relays at most.
+    pub fn poll_overheard(&mut self) -> impl Iterator<Item = u16> {
+        let seen = core::mem::take(&mut self.watching.seen);
+        let near = 1..=STATION_REACH.min(self.watching.all);
+        let distances = near.filter(move |it| seen & bit(*it) != 0);
+        distances.map(|distance| self.at(distance))
+    }
+
     /// Returns the next received report of a relay; `None` if there is none. `now` counts as its arrival.
     ///
     /// Call it after [`handle_bytes`](Self::handle_bytes) until it returns `None`: of more than 64 waiting reports the
@@ -607,6 +619,8 @@ struct Watching {
     reach: u16,
     /// Bit mask of relays. A relay's bit is set if it has sent a frame to any node since the last request to it.
     overheard: u8,
+    /// Bit mask of relays. A relay's bit is set if it has sent a frame since the last call of [`Ground::poll_overheard`].
+    seen: u8,
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
@@ -637,6 +651,7 @@ impl Watching {
             all,
             reach: most.min(all),
             overheard: 0,
+            seen: 0,
             repeat_at: None,
             number: (epoch as u16) << 10,
             distance: 0,

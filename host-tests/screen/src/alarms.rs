@@ -3,6 +3,8 @@
 //! A program that receives events begins and ends alarms by [`Alarms::begin`] and [`Alarms::end`]. A program that knows which alarms
 //! last passes all of them to [`Alarms::settle`].
 
+use std::collections::BTreeSet;
+
 use crate::snapshot::{Alarm, Urgency};
 
 /// Number of stored alarms above which ended alarms are dropped.
@@ -117,9 +119,21 @@ struct Entry {
     reason: Reason,
     subject: u16,
     reporters: Vec<u16>,
+    /// Present and earlier reporters.
+    ever: BTreeSet<u16>,
+    note: String,
 }
 
 impl Entry {
+    /// Ends the alarm. Its text then names all relays that have reported it.
+    fn end(&mut self, time_s: f64) {
+        self.alarm.cleared_s = Some(time_s);
+        if !self.reporters.is_empty() {
+            let all: Vec<u16> = self.ever.iter().copied().collect();
+            self.alarm.text = self.reason.text(self.subject, &all) + &self.note;
+        }
+    }
+
     const fn lasts(&self) -> bool {
         self.alarm.cleared_s.is_none()
     }
@@ -153,7 +167,8 @@ impl Alarms {
         let mut entries = self.entries.iter_mut();
         let same = |it: &&mut Entry| it.lasts() && (it.reason, it.subject) == (reason, subject);
         if let Some(known) = entries.find(same) {
-            known.reporters = reporters;
+            known.ever.extend(&reporters);
+            (known.reporters, known.note) = (reporters, note);
             known.alarm.text = text;
             return;
         }
@@ -169,7 +184,9 @@ impl Alarms {
             },
             reason,
             subject,
+            ever: reporters.iter().copied().collect(),
             reporters,
+            note,
         });
         if self.entries.len() > MOST {
             let all = self.entries.iter().enumerate();
@@ -187,14 +204,15 @@ impl Alarms {
     pub fn end(&mut self, time_s: f64, reason: Reason, subject: Option<u16>, by: u16) {
         let lasting = self.entries.iter_mut().filter(|it| it.lasts());
         for entry in lasting.filter(|it| it.reason == reason) {
-            match subject {
-                Some(subject) if subject == entry.subject => entry.reporters.clear(),
+            let is_over = match subject {
+                Some(subject) if subject == entry.subject => true,
                 Some(_) => continue,
-                None => entry.reporters.retain(|it| *it != by),
-            }
-            if entry.reporters.is_empty() {
-                entry.alarm.cleared_s = Some(time_s);
+                None => entry.reporters.iter().all(|it| *it == by),
+            };
+            if is_over {
+                entry.end(time_s);
             } else {
+                entry.reporters.retain(|it| *it != by);
                 entry.alarm.text = reason.text(entry.subject, &entry.reporters);
             }
         }
@@ -205,7 +223,7 @@ impl Alarms {
         for entry in self.entries.iter_mut().filter(|it| it.lasts()) {
             let same = |it: &Lasting| (it.0, it.1) == (entry.reason, entry.subject);
             if !lasting.iter().any(same) {
-                entry.alarm.cleared_s = Some(time_s);
+                entry.end(time_s);
             }
         }
         for alarm in lasting {

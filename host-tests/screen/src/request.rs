@@ -11,6 +11,7 @@
 use std::fmt;
 use std::hash::{BuildHasher as _, RandomState};
 use std::net::{IpAddr, SocketAddr};
+use std::str::FromStr;
 use std::sync::LazyLock;
 
 /// Largest size of a request, bytes.
@@ -234,7 +235,7 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr, access: &Access
             Some(_) => {}
         }
     }
-    let length = only("content-length").and_then(|length| length.parse().ok());
+    let length = only("content-length").and_then(whole);
     let is_chunked = values("transfer-encoding").next().is_some();
     if let (Some("POST"), Some(token)) = (request.method, &access.token) {
         let task = TASKS.into_iter().find(|(of, _)| *of == path);
@@ -277,12 +278,14 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr, access: &Access
     )
 }
 
+/// Parses a whole number that consists of digits only.
+fn whole<T: FromStr>(text: &str) -> Option<T> {
+    let is_plain = text.bytes().all(|it| it.is_ascii_digit());
+    text.parse().ok().filter(|_| is_plain)
+}
+
 /// Parses the rest of a map tile's path, `ZOOM/X/Y`; `None` if there is no such tile.
 fn tile(path: &str) -> Option<(u8, u32, u32)> {
-    let whole = |part: &str| {
-        let is_plain = part.bytes().all(|it| it.is_ascii_digit()) && part.len() <= 8;
-        part.parse::<u32>().ok().filter(|_| is_plain)
-    };
     let parts: Option<Vec<u32>> = path.split('/').map(whole).collect();
     let &[zoom, x, y] = parts.as_deref()? else {
         return None;
@@ -330,7 +333,7 @@ fn is_same(given: &[u8], secret: &[u8]) -> bool {
 fn is_own(host: &str, own: SocketAddr) -> bool {
     let (name, port) = match host.rsplit_once(':') {
         // A colon inside of brackets belongs to an IPv6 address.
-        Some((name, port)) if !port.ends_with(']') => (name, port.parse().ok()),
+        Some((name, port)) if !port.ends_with(']') => (name, whole(port)),
         _ => (host, Some(80)),
     };
     if port != Some(own.port()) {
@@ -471,6 +474,7 @@ mod tests {
             ("Content-Length: 2", "Content-Length: 3", 0),
             ("Content-Length: 2", "Content-Length: 4097", 413),
             ("Content-Length: 2", "Content-Length: -2", 400),
+            ("Content-Length: 2", "Content-Length: +2", 400),
             ("Content-Length: 2", "Transfer-Encoding: chunked", 400),
             ("Origin", "Sec-Fetch-Site: cross-site\nOrigin", 403),
         ] {
@@ -519,6 +523,7 @@ mod tests {
             ),
             ("GET / HTTP/1.1\nHost: 127.0.0.1", 403),
             ("GET / HTTP/1.1\nHost: 127.0.0.1:8081", 403),
+            ("GET / HTTP/1.1\nHost: 127.0.0.1:+8080", 403),
             ("GET / HTTP/1.1\nHost: evil.example:8080", 403),
             ("GET / HTTP/1.1\nHost: 127.0.0.2:8080", 403),
             (

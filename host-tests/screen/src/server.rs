@@ -55,6 +55,11 @@ const REQUEST_TIME: Duration = Duration::from_secs(5);
 /// Time within which a browser has to receive one file or one snapshot.
 const WRITE_TIME: Duration = Duration::from_secs(10);
 
+/// Time without any received byte after which the system ends the connection of a browser.
+///
+/// It applies to the stream of snapshots. It begins when the browser's receive buffer is full.
+const UNREAD_TIME: Duration = Duration::from_secs(20);
+
 /// Time for which the server reads and ignores the rest of a request after its answer.
 ///
 /// Otherwise unread bytes would reset the connection before the answer arrives at the browser.
@@ -636,6 +641,7 @@ fn serve(mut stream: TcpStream, counted: &mut Counted) -> io::Result<()> {
     write_all(&mut stream, &response)?;
     if answer == Answer::Events {
         _ = stream.set_nodelay(true);
+        end_if_unread(&stream);
         return shared.stream(&mut stream);
     }
     // The rest of a refused request is read, because unread bytes would reset the connection before the refusal arrives.
@@ -695,6 +701,18 @@ fn read_some(stream: &mut TcpStream, bytes: &mut [u8], until: Instant) -> io::Re
     stream.set_read_timeout(Some(left(until)?))?;
     stream.read(bytes)
 }
+
+/// Lets the system end the connection if the browser receives nothing for [`UNREAD_TIME`].
+///
+/// Writing alone would notice it once the system's send buffer is full, which takes small snapshots many minutes.
+#[cfg(target_os = "linux")]
+fn end_if_unread(stream: &TcpStream) {
+    let millis = u32::try_from(UNREAD_TIME.as_millis()).unwrap_or(u32::MAX);
+    _ = rustix::net::sockopt::set_tcp_user_timeout(stream, millis);
+}
+
+#[cfg(not(target_os = "linux"))]
+const fn end_if_unread(_: &TcpStream) {}
 
 /// Writes all bytes; an error if the browser does not receive all of them within [`WRITE_TIME`].
 fn write_all(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | a relay has not reported yet | notice |
 //! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`], or for one and a half times as long as it recently was, up to 10 s | critical, one for the relay |
-//! | the same without a neighbour's report, within 10 s of the last report of a relay nearer to the station that is silent, too, or within 5 s of its return | none yet: the reports may have to find another way |
+//! | the same without a neighbour's report, within 15 s of its last report: a relay nearer to the station is silent, too, for less than 10 s, or has returned within 5 s; or the station has [received](StationView::overhear) another frame of the relay within 5 s | none yet: the reports may have to find another way, or were lost |
 //! | no frame from a chain that has reported, for [`SILENT_AFTER`] | critical; it replaces the alarms about single relays |
 //! | no quorum, no feasible positions, two nodes with a relay's number | critical |
 //! | autopilot without a position, or its link lost after it was there | critical |
@@ -42,14 +42,23 @@ const UNSURE_AFTER: Duration = Duration::from_millis(2_500);
 /// The reports of relays farther away from the station then arrive again.
 const CLOSED_AFTER: Duration = SILENT_AFTER.times(2);
 
+/// Age of a relay's newest report from which the alarm that the relay is silent is no longer delayed.
+///
+/// Only a silence of the whole chain still delays it. Before, received frames of the relay delay it, and silent relays on the way of its reports. The frames are not
+/// verified, and with lost frames some relay on the way is always silent: without a limit, they could hide a loss.
+const OVERDUE_AFTER: Duration = SILENT_AFTER.times(3);
+
 /// Time for which the alarm about rejected frames lasts after the last rejected frame.
 const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 
 /// Time after which a drone that comes no nearer to its setpoint causes an alarm.
 ///
 /// Only every eighth report contains the setpoint: a drone on its way to a new setpoint may therefore seem to fly away
-/// from the previous setpoint for 10 s.
+/// from the previous setpoint for 10 s, or longer if reports are lost.
 const STUCK_AFTER: Duration = Duration::from_millis(15_000);
+
+/// Time after the drone was nearest to its setpoint from which a report with this setpoint confirms it.
+const CONFIRMED_AFTER: Duration = Duration::from_millis(2_000);
 
 /// Time after which a relay that has returned should no longer be refused for its earlier mission.
 ///
@@ -92,6 +101,8 @@ struct Known {
     ///
     /// `None` while the relay does not move the drone, or the drone has arrived.
     nearest: Option<(Instant, f32)>,
+    /// Time of the last report that had details, and so the setpoint.
+    detailed_at: Instant,
     /// Time of the first report that has the same neighbours as the newest report.
     neighbours_at: Instant,
     /// Time of the first report after the relay's last silence; `None` before a silence.
@@ -110,13 +121,16 @@ impl Known {
             unleased_at: None,
             longest_age: Duration::from_micros(0),
             nearest: None,
+            detailed_at: report.at,
             neighbours_at: report.at,
             returned_at: None,
         }
     }
 
     /// Stores a newer report of the relay, or its first one, and updates the history.
-    fn take(&mut self, now: Instant, report: Report) {
+    ///
+    /// `is_detailed` is true if the report has details of its own, and false if they are those of an earlier report.
+    fn take(&mut self, now: Instant, report: Report, is_detailed: bool) {
         let before = std::mem::replace(&mut self.report, report);
         let decayed = Duration::from_micros(self.longest_age.as_micros() * 7 / 8);
         let age = now.since(before.at);
@@ -139,8 +153,14 @@ impl Known {
         let was_linked = before.control.is_some_and(|it| it != State::Silent);
         self.is_link_lost =
             report.control == Some(State::Silent) && (self.is_link_lost || was_linked);
+        if is_detailed {
+            self.detailed_at = report.at;
+        }
         let is_unleased = report.agreed.is_some() && !report.holds_lease;
-        self.unleased_at = is_unleased.then(|| self.unleased_at.unwrap_or(report.at));
+        // After a restart the stored agreed position is not the relay's, until a report with details arrives.
+        let has_restarted = age >= UNSURE_AFTER && before.control != report.control;
+        let unleased_at = self.unleased_at.filter(|_| !has_restarted);
+        self.unleased_at = is_unleased.then(|| unleased_at.unwrap_or(report.at));
         let known = self.nearest.filter(|_| before.setpoint == report.setpoint);
         let way_m = distance_to_fly_m(&report).filter(|it| *it > NEAR_M);
         self.nearest = way_m.map(|it| match known {
@@ -164,8 +184,13 @@ impl Known {
         usual.clamp(SILENT_AFTER, SILENT_AFTER.times(2))
     }
 
+    /// Returns true if the drone has come no nearer to its setpoint for [`STUCK_AFTER`].
+    ///
+    /// A report of this time must have confirmed the setpoint.
     fn is_stuck(&self) -> bool {
-        let is_long = |(at, _)| self.report.at.since(at) >= STUCK_AFTER;
+        let is_long = |(at, _)| {
+            self.report.at.since(at) >= STUCK_AFTER && self.detailed_at.since(at) >= CONFIRMED_AFTER
+        };
         self.nearest.is_some_and(is_long)
     }
 
@@ -206,6 +231,8 @@ pub struct StationView {
     /// The key of the outer map is the silent relay, the key of the inner map the neighbour.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     refused: BTreeMap<(Reason, u16), Refused>,
+    /// Times of the last frames that the station has received of its nearest relays, to any node.
+    overheard: BTreeMap<u16, Instant>,
     /// Lost relays that an operator has cleared from the display, with the time of each command.
     cleared: BTreeMap<u16, Instant>,
     /// Log lines of the next snapshot.
@@ -231,6 +258,12 @@ impl StationView {
     /// Returns the newest version of the mission that relays report; `None` until a report has a version.
     pub fn version(&self) -> Option<u16> {
         self.version.map(|(version, _)| version)
+    }
+
+    /// Records that the station has received frames of these relays, to any node, since the last snapshot.
+    pub fn overhear(&mut self, now: Instant, relays: impl IntoIterator<Item = u16>) {
+        self.overheard
+            .extend(relays.into_iter().map(|it| (it, now)));
     }
 
     /// Removes a lost relay and its alarm from the snapshots, until a report newer than `now` arrives.
@@ -294,6 +327,7 @@ impl StationView {
     /// Returns false if `report` is not newer than the stored report.
     fn take(&mut self, now: Instant, report: Report, log: &mut Vec<LogLine>) -> bool {
         let number = report.relay;
+        let is_detailed = report.version.is_some();
         let before = self.known.get(&number).map(|it| it.report);
         let mut newest = before.unwrap_or(report);
         if before.is_some() && !newest.update(report) {
@@ -312,7 +346,7 @@ impl StationView {
         let known = self.known.entry(number);
         known
             .or_insert_with(|| Known::new(report))
-            .take(now, report);
+            .take(now, report, is_detailed);
         for lost in silent(&report) {
             // A neighbour that has never been received is not lost.
             let was_received = before.is_some_and(|before| {
@@ -477,7 +511,9 @@ impl StationView {
             // While nothing at all is received, an alarm that has begun stays, and none begins.
             let begins = quiet < QUIET_AFTER
                 && now.since(heard_at) >= after
-                && !self.may_be_behind(now, chain.end, number);
+                && (now.since(heard_at) >= OVERDUE_AFTER
+                    || !self.is_overheard(now, number)
+                        && !self.may_be_behind(now, chain.end, number));
             let is_silent = is_late && (begins || self.alarms.lasts(Reason::Lost, number));
             if is_silent || !by.is_empty() {
                 let note = match (is_late, by.is_empty()) {
@@ -521,6 +557,12 @@ impl StationView {
             }
         }
         all
+    }
+
+    /// Returns true if the station still receives frames of relay `number`.
+    fn is_overheard(&self, now: Instant, number: u16) -> bool {
+        let last = self.overheard.get(&number);
+        last.is_some_and(|last| now.since(*last) < SILENT_AFTER)
     }
 
     /// Returns true if reports of relay `number` may be missing because of a silent relay on their way.

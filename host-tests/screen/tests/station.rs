@@ -128,9 +128,18 @@ impl Watched {
             "nolink" => report.control = Some(State::Silent),
             "bench" => (report.control, report.position) = (None, None),
             "away" => report.setpoint = Some(Placement::on_line(20.0, 20.0)),
+            "leaves" => {
+                report.position = Some(Placement::on_line(20.0, 20.0));
+                report.version = None;
+            }
+            "detailed" => report.version = Some(0),
             "unlocated" => report.position = None,
             "expired" => report.holds_lease = false,
             "restarted" => (report.agreed, report.setpoint) = (None, None),
+            "rebooted" => {
+                (report.control, report.holds_lease) = (Some(State::Standby), false);
+                report.version = None;
+            }
             "brief" => {
                 (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
                 report.version = None;
@@ -388,6 +397,62 @@ fn a_silent_relay_next_to_tx_or_rx_is_lost_once_its_neighbour_is_the_last_one() 
         watched.second();
         assert_eq!(watched.condition(lost), Some(Condition::Normal));
     }
+}
+
+/// Checks that frames of a relay prevent the alarm about its missing reports for 15 s.
+///
+/// They do not prevent the alarm that a neighbour reports.
+#[test]
+fn a_relay_whose_frames_are_received_is_not_lost_before_15_s() {
+    let mut watched = Watched::new();
+    let second = |watched: &mut Watched| {
+        let now = Instant::from_millis(1_000 * watched.second + 500);
+        watched.view.overhear(now, [3]);
+        watched.second();
+        watched.lasting()
+    };
+    watched.second();
+    watched.changes("3:off");
+    for after in 1..=14 {
+        assert_eq!(second(&mut watched), ".", "after {after} s");
+    }
+    assert_eq!(
+        second(&mut watched),
+        "1 Critical relay 3: no report for 5 s"
+    );
+    watched.changes("3:ok");
+    assert_eq!(second(&mut watched), ".");
+    watched.changes("3:off");
+    (0..10).for_each(|_| assert_eq!(second(&mut watched), "."));
+    // Without further frames the alarm begins after 5 s.
+    for _ in 0..4 {
+        watched.second();
+        assert_eq!(watched.lasting(), ".");
+    }
+    watched.second();
+    assert!(watched.lasting().contains("relay 3: no report"));
+    watched.changes("3:ok");
+    assert_eq!(second(&mut watched), ".");
+    watched.changes("3:off 2:deafnext");
+    assert!(second(&mut watched).contains("relay 3 lost: reported by relay 2"));
+}
+
+/// Checks that the text of an ended alarm names all relays that have reported it.
+#[test]
+fn an_ended_alarm_names_all_its_relays() {
+    let mut watched = Watched::new();
+    watched.second();
+    watched.changes("12:noquorum");
+    watched.second();
+    watched.changes("1:ok 4:noquorum");
+    watched.second();
+    let lasting = "1 Critical no quorum: relays 2 and 4 cannot reach enough relays, position held";
+    assert_eq!(watched.lasting(), lasting);
+    watched.changes("24:ok");
+    watched.second();
+    assert_eq!(watched.lasting(), ".");
+    let text = "no quorum: relays 1, 2 and 4 cannot reach enough relays, position held";
+    assert_eq!(watched.last.alarms[0].text, text);
 }
 
 /// Checks that a neighbour's outdated report does not mark a relay as lost.

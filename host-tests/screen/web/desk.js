@@ -126,7 +126,7 @@ function stateText({ why, number, stage, fault, version, adopted, arrived, relay
 /** Returns the worst SIRs of a mission: toward Rx, and back if known. */
 function worstText(sirs) {
   if (!sirs) return "unknown";
-  const [there, back] = sirs.map((db) => (typeof db === "number" ? `${db.toFixed(1)} dB` : null));
+  const [there, back] = sirs.map((db) => (typeof db === "number" ? `${fixed(db, 1)} dB` : null));
   return back ? `${there ?? "–"} toward Rx, ${back} back` : there ?? "unknown";
 }
 

@@ -7,6 +7,9 @@ const GOOD_DB = 3;
 
 const sirClass = (db) => (typeof db !== "number" ? "unknown" : db >= GOOD_DB ? "good" : db >= FAIR_DB ? "fair" : "poor");
 
+/** Formats a number with a fixed number of digits, without the sign of a rounded zero. */
+const fixed = (value, digits) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "");
+
 /** Line style of each SIR class: width and dashes, px. */
 const STYLES = { good: [4, []], fair: [3, [8, 4]], poor: [4, [3, 3]], unknown: [1.5, []] };
 
@@ -584,8 +587,8 @@ class ChainMap {
       const worse = worseDb(hop);
       if (worse === null) continue;
       const [[x1, y1], [x2, y2]] = [at.get(hop.from), at.get(hop.to)];
-      const both = [hopDb(hop), backDb(hop)].map((db) => (typeof db === "number" ? db.toFixed(1) : "–"));
-      const texts = typeof backDb(hop) === "number" ? [`${both.join(" / ")} dB`, `${worse.toFixed(1)} dB`] : [`${worse.toFixed(1)} dB`];
+      const both = [hopDb(hop), backDb(hop)].map((db) => (typeof db === "number" ? fixed(db, 1) : "–"));
+      const texts = typeof backDb(hop) === "number" ? [`${both.join(" / ")} dB`, `${fixed(worse, 1)} dB`] : [`${fixed(worse, 1)} dB`];
       texts.some((text) => this.write(text, (x1 + x2) / 2, (y1 + y2) / 2 + 16, sirClass(worse)));
     }
   }

@@ -22,7 +22,7 @@ const profile = new Profile(byId("profile"), map);
 /** `at` is the time when the server wrote the last snapshot, and `age` how long before it was sent; both in ms. */
 const received = { snapshots: 0, first: 0, last: null, at: 0, age: 0, source: null, tried: 0 };
 
-const number = (value, digits) => (typeof value === "number" ? value.toFixed(digits) : "–");
+const number = (value, digits) => (typeof value === "number" ? fixed(value, digits) : "–");
 
 /** Formats the SIR of a hop: that of the model, and the measured one after a slash. */
 const sirText = (model, measured) => (typeof measured === "number" ? `${number(model, 1)} / ${number(measured, 1)}` : number(model, 1));
@@ -82,7 +82,7 @@ function summary({ relays, hops }) {
   const lost = relays.filter(({ condition }) => condition === "lost").map((relay) => relay.number);
   const ways = hops.flatMap((hop) => [{ from: hop.from, to: hop.to, db: hopDb(hop) }, { from: hop.to, to: hop.from, db: backDb(hop) }]);
   const [first] = ways.filter(({ db }) => typeof db === "number").sort((one, other) => one.db - other.db);
-  const worst = first ? `worst hop ${first.from} to ${first.to}: ${first.db.toFixed(1)} dB` : "no SIR known";
+  const worst = first ? `worst hop ${first.from} to ${first.to}: ${fixed(first.db, 1)} dB` : "no SIR known";
   return `${relays.length} relays, ${lost.length ? `lost: ${lost.join(", ")}` : "none lost"}; ${worst}`;
 }
 

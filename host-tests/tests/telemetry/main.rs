@@ -2,6 +2,7 @@
 //!
 //! `cargo test --test telemetry -- --nocapture` prints the figures.
 
+mod alarms;
 mod changes;
 
 use host_tests::fixtures::paper;

@@ -127,15 +127,17 @@ fn fly_live(chain: &mut Chain, view: &mut LiveView, screen: &Screen, speed: f64)
     let micros = FRAME.mul_f64(speed).as_micros();
     let frame = uav_relay::Duration::from_micros(u64::try_from(micros).unwrap_or(u64::MAX));
     let mut now = uav_relay::Instant::ZERO;
+    let mut due = Instant::now();
     loop {
-        let begun = Instant::now();
+        // A late snapshot does not delay the next one, unless the computer is too slow for all of them.
+        due = (due + FRAME).max(Instant::now());
         now = now + frame;
         let has_ended = chain.advance(now);
         screen.show(view.snapshot(chain, now));
         if has_ended {
             return;
         }
-        std::thread::sleep(FRAME.saturating_sub(begun.elapsed()));
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
     }
 }
 

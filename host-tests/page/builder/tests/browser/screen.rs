@@ -227,6 +227,8 @@ fn snapshots_that_stop_are_an_alarm_and_another_run_begins_anew() {
 fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     let shown = Shown::begin(|| {
         let mut snapshot = full(5, 0.0);
+        snapshot.relays[0].position.as_mut().unwrap().y_m = -0.04;
+        snapshot.relays[0].agreed.as_mut().unwrap().y_m = -0.04;
         snapshot.relays[2].position = None;
         snapshot.relays[4].agreed.as_mut().unwrap().altitude_m = None;
         snapshot.hops[1].sir_db = Some(8.0);
@@ -236,6 +238,8 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     });
     let mut browser = shown.opened(1280, 900);
     browser.until(&shows(6));
+    let y_m = browser.text("byId('rows').children[0].children[7].textContent");
+    assert_eq!(y_m, "0.0");
     let texts = written(&mut browser);
     assert!(texts.contains("3, position unknown"), "{texts}");
     // Both values have no room at this width: the label is that of the worse direction.

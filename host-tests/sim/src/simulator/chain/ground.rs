@@ -23,6 +23,9 @@ use crate::simulator::outcome::{Link, Moment, TimelineEvent};
 use crate::simulator::setup::Setup;
 use crate::simulator::true_interference::{Snapshot, TrueInterference};
 
+/// Largest number of a station's reports that wait for [`Chain::arrived`].
+const ARRIVED: usize = 64;
+
 impl Chain {
     pub(super) fn begin_upload(&mut self, which: usize) {
         let Some(spec) = self.setup.uploads.get(which).copied() else {
@@ -63,6 +66,18 @@ impl Chain {
         station.map_or(Vec::new(), |it| it.reports.values().copied().collect())
     }
 
+    /// Returns the reports that have reached the ground station at `end` since the last call.
+    ///
+    /// The second list has the relays of which the station has received frames. Of more than [`ARRIVED`] reports the newest are missing.
+    pub fn arrived(&mut self, end: Side) -> (Vec<Report>, Vec<u16>) {
+        let mut stations = self.stations.iter_mut();
+        let Some(station) = stations.find(|station| station.end == end) else {
+            return (Vec::new(), Vec::new());
+        };
+        let overheard = station.ground.poll_overheard().collect();
+        (std::mem::take(&mut station.arrived), overheard)
+    }
+
     /// Passes received bytes to the ground station `at` (from 0) and sends its replies.
     pub(super) fn station_receive(&mut self, at: usize, bytes: &[u8]) {
         if let Some(station) = self.stations.get_mut(at) {
@@ -73,6 +88,9 @@ impl Chain {
             while let Some(report) = station.ground.poll_report(self.now) {
                 let newest = station.reports.entry(report.relay).or_insert(report);
                 newest.update(report);
+                if station.arrived.len() < ARRIVED {
+                    station.arrived.push(report);
+                }
             }
         }
         self.drain_station(at);
@@ -200,6 +218,8 @@ pub(super) struct Station {
     pub(super) wake: Option<Instant>,
     /// Newest report of each relay. The key is the relay's number.
     reports: BTreeMap<u16, Report>,
+    /// Reports received since the last call of [`Chain::arrived`].
+    arrived: Vec<Report>,
 }
 
 impl Station {
@@ -238,6 +258,7 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
             line: Line::default(),
             wake: None,
             reports: BTreeMap::new(),
+            arrived: Vec::new(),
         })
         .collect()
 }
