@@ -150,7 +150,7 @@ pub fn attach<'a>(
     if path != asked {
         let (name, asked) = (path.display().to_string(), asked.display());
         let what = format_args!(
-            "the capture is written to {name}, because {asked} holds an earlier capture"
+            "written to {name}, because {asked} holds an earlier capture"
         );
         log.event(Instant::ZERO, "capture", json!({ "file": name }), what);
     }

@@ -156,7 +156,7 @@ fn a_restart_keeps_the_capture_of_the_start_before() {
         if number > 1 {
             let line = relay.line("capture: written to ");
             let said = format!(
-                "the capture is written to {}, because {} holds an earlier capture",
+                "written to {}, because {} holds an earlier capture",
                 file.display(),
                 first.display()
             );

@@ -16,7 +16,7 @@ fn sixth() -> (Bench, WireMessage) {
     (bench, sweep)
 }
 
-/// Returns a hello that reports the chosen neighbour `neighbour`, and that the nearest node is received.
+/// Returns a hello whose sender has chosen the neighbour `neighbour`, and receives the nearest node.
 ///
 /// The hello requests no answer.
 fn hello_choosing(bench: &Bench, neighbour: u16) -> WireMessage {

@@ -63,8 +63,8 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour; 0 if there is none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// End of the grace period after the selection of a neighbour, in which this relay requests no new view. In this
-    /// period the neighbour may be selected by the relay on its other side, too: one view change is enough for both.
+    /// End of the grace period after the selection of a neighbour. In it this relay requests no new view, because the
+    /// relay on the neighbour's other side may select the neighbour, too: one view change is enough for both.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,

@@ -370,7 +370,7 @@ const HOPS_AT_ONCE: u16 = 12;
 /// Such a hop takes twice as much computation as a hop with one interferer ([`HOPS_AT_ONCE`]).
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
-/// Choice of the next pass along the chain by the leader, and the leader's computation before this pass.
+/// Choice of the next pass along the chain, and the computation before it, both by the leader.
 impl Computation {
     /// Continues the computation for the current pass along the chain, or for the leader's next one.
     ///

@@ -50,9 +50,9 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects the sweeps (passes of messages along the chain) that the figure shows, more densely toward the end.
+/// Selects the sweeps that the figure shows, more densely toward the end.
 ///
-/// These are the first sweep, every 100th, every 10th of the last 1000, and the last 20.
+/// A sweep is a pass of messages along the chain. The selected sweeps are the first sweep, every 100th, every 10th of the last 1000, and the last 20.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()
