@@ -149,9 +149,7 @@ pub fn attach<'a>(
     });
     if path != asked {
         let (name, asked) = (path.display().to_string(), asked.display());
-        let what = format_args!(
-            "written to {name}, because {asked} holds an earlier capture"
-        );
+        let what = format_args!("written to {name}, because {asked} holds an earlier capture");
         log.event(Instant::ZERO, "capture", json!({ "file": name }), what);
     }
     Ok(())

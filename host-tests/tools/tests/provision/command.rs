@@ -448,7 +448,10 @@ fn all_or_none_is_written() {
         dir.display()
     );
     let line = refusal(&wide);
-    assert!(line.contains("a drone's configuration block holds at most 16"), "{line}");
+    assert!(
+        line.contains("a drone's configuration block holds at most 16"),
+        "{line}"
+    );
     assert!(!dir.exists());
     // A folder named like a block cannot be replaced. Files that were renamed before are removed again.
     std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
