@@ -146,8 +146,9 @@ impl ChannelLoad {
         pairs.saturating_add(1)
     }
 
-    /// Returns the minimum `probe_after` of the relays' settings on a channel of `baud` bit/s. `dead_after` should be
-    /// three times this value.
+    /// Returns the lowest permissible value of the relays' setting `probe_after` at `baud` bit/s.
+    ///
+    /// The setting `dead_after` should be three times `probe_after`.
     pub const fn least_probe_after(self, baud: u32) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         Duration::from_micros(self.needed().div_ceil(baud))

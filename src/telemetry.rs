@@ -35,7 +35,7 @@ pub struct Report {
     pub hold_reasons: [Option<HoldReason>; 2],
     /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],
-    /// Flags for the neighbours toward Tx and toward Rx: true if the relay does not receive it now.
+    /// Silent neighbours, toward Tx and toward Rx: true if the relay does not receive this neighbour now.
     pub silent: [bool; 2],
     /// True if the relay has recently received a second node with its own number. Recently means within three times the
     /// setting `dead_after`.

@@ -15,7 +15,7 @@ use crate::log::Log;
 pub const LONGEST: usize = 200;
 
 /// Description of the permitted powers, for error messages.
-const POWER: &str = "a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm";
+const POWER: &str = "a power in W without the unit, within 1e-30 to 1e6, or in dBm with the unit, for example -95 dBm";
 
 /// Parses a power from the words of a line: a number in W, or a number followed by `dBm`. Returns the power in W.
 ///

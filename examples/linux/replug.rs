@@ -77,7 +77,7 @@ impl Replug {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
             let what = format_args!(
-                "{failure}; check its cable: the program opens the port again as soon as the device is back"
+                "{failure}; check the cable of the device: the program opens the port again as soon as the device is back"
             );
             log.event(now, "port lost", self.fields(), what);
             self.tty = None;

@@ -205,13 +205,13 @@ impl StoredFile {
             Ok(()) => {
                 self.writes += 1;
                 let failures = self.failures;
-                format!("can be written again, after {failures} failures")
+                format!("can be written again, after {failures} failed attempts")
             }
             Err(error) => {
                 self.failures += 1;
                 self.again_at = now + AGAIN;
                 format!(
-                    "cannot be written: {error}; the relay flies on, and tries to write it again every second"
+                    "cannot be written: {error}; the relay continues without it, and tries to write the file again every second"
                 )
             }
         };

@@ -16,6 +16,9 @@ use crate::autopilot::Companion;
 use crate::lost::log_command;
 use uav_relay_linux::log::Log;
 
+/// Beginning of the texts to the pilot if the relay leaves because of its battery.
+const LOW: &str = "battery: low, ";
+
 /// Time between two texts to the pilot about the same refused departure from the chain.
 const AGAIN: Duration = Duration::from_millis(60_000);
 
@@ -126,13 +129,13 @@ impl Battery {
             self.told_at = now;
             let text = match departure {
                 Departure::Requested => Some("asks others to fill its place"),
-                Departure::Outside => Some("waits for others to fill its place"),
+                Departure::Outside => Some("waits until its place is filled"),
                 Departure::Free => Some("has permission to leave"),
                 Departure::Member => Some("is in the chain, or joins it"),
                 _ => refusal,
             };
             let why = if relay.leaves_by_endurance() {
-                "battery: low, "
+                LOW
             } else {
                 "relay: "
             };
@@ -158,9 +161,9 @@ impl Battery {
             "stay" => {
                 relay.stay(now);
                 if relay.is_at_reserve() {
-                    "this relay stays in the chain, as the operator commands; the battery has only the way home and the reserve left: fly the drone home"
+                    "this relay stays in the chain, as the operator commands; the battery lasts only for the way home and the reserve: fly the drone home"
                 } else if relay.endurance_limit_s().is_some() {
-                    "this relay stays in the chain, as the operator commands; it asks again to leave when half of its remaining time of flight (without the way home) has passed, or at its usual limit if that is later"
+                    "this relay stays in the chain, as the operator commands; it asks again to leave when its remaining time of flight, less the time of the way home, is below half of the present value, and also below the limit at which it usually asks"
                 } else {
                     "this relay stays in the chain, as the operator commands"
                 }
@@ -197,14 +200,14 @@ const fn is_pending(departure: Departure) -> bool {
     )
 }
 
-/// Returns the pilot's text for the reason of a refused departure, at most 37 bytes; otherwise `None`.
+/// Returns the pilot's text for the reason of a refused departure, at most 36 bytes; otherwise `None`.
 const fn refusal(departure: Departure) -> Option<&'static str> {
     Some(match departure {
-        Departure::NeedsGuard => "refused: no guard",
-        Departure::NeedsChannel => "refused: needs a shared radio",
-        Departure::NeedsQuorum => "refused: the chain would be too small",
-        Departure::WideGap => "refused: too many absent relays",
-        Departure::Blocked => "refused: neighbours lack a link",
+        Departure::NeedsGuard => "may not leave: drones not kept apart",
+        Departure::NeedsChannel => "may not leave: needs a shared radio",
+        Departure::NeedsQuorum => "may not leave: others lack a quorum",
+        Departure::WideGap => "may not leave: too many are absent",
+        Departure::Blocked => "may not leave: neighbours not linked",
         _ => return None,
     })
 }
@@ -232,7 +235,7 @@ const fn describe(departure: Departure) -> &'static str {
             "this relay asks to leave the chain, and holds its position until the leader's order"
         }
         Departure::NeedsGuard => {
-            "this relay asks to leave and is refused: without --positions or --autopilot no guard keeps its neighbours away from this drone"
+            "this relay asks to leave and is refused: without --positions or --autopilot nothing keeps the drones of its neighbours away from this drone"
         }
         Departure::NeedsChannel => {
             "this relay asks to leave and is refused: over --upstream and --downstream its neighbours do not receive each other, use --shared"
@@ -241,7 +244,7 @@ const fn describe(departure: Departure) -> &'static str {
             "this relay asks to leave and is refused for now: the remaining relays would have no quorum"
         }
         Departure::WideGap => {
-            "this relay asks to leave and is refused for now: too many relays beside it are absent (the numbers of its neighbours differ by more than four)"
+            "this relay asks to leave and is refused for now: too many relays beside it are absent: the numbers of its two neighbours differ by more than four, so these could not become neighbours of each other"
         }
         Departure::Blocked => {
             "this relay asks to leave and is refused for a minute: its neighbours do not receive each other"
@@ -256,5 +259,30 @@ const fn describe(departure: Departure) -> &'static str {
             "this drone has permission to leave; its relay has no place in the chain"
         }
         _ => "the relay's departure is in a state that this program does not know",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use uav_relay::Departure;
+
+    /// Every refusal fits into a STATUSTEXT of 50 characters, so that the autopilot link does not cut it.
+    #[test]
+    fn refusals_fit_into_the_text_for_the_pilot() {
+        for departure in [
+            Departure::NeedsGuard,
+            Departure::NeedsChannel,
+            Departure::NeedsQuorum,
+            Departure::WideGap,
+            Departure::Blocked,
+        ] {
+            let text = super::refusal(departure).unwrap();
+            let longest = format!("{}{text}", super::LOW);
+            assert!(
+                longest.len() <= 50,
+                "{longest:?} has {} bytes",
+                longest.len()
+            );
+        }
     }
 }

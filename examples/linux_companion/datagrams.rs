@@ -41,7 +41,7 @@ impl Datagrams {
             .map_err(|error| format!("{peer} cannot be reached: {error}"))?;
         if socket.local_addr().is_ok_and(|own| own == peer) {
             return Err(format!(
-                "{peer} is this program's own address and port: LOCAL in udp:HOST:PORT@LOCAL must differ from PORT, within 1 to 65535"
+                "{peer} is this program's own address and port: give a LOCAL within 1 to 65535 that differs from PORT in udp:HOST:PORT@LOCAL"
             ));
         }
         let ready = socket.set_nonblocking(true);

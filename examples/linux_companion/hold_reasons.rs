@@ -89,14 +89,14 @@ fn describe(reason: HoldReason, whom: &str) -> String {
             )
         }
         HoldReason::Order => format!(
-            "this drone is on the wrong side of {whom} along the line from Tx to Rx, or too close to it to decide: fly one of the two drones by hand until they are in the order of their numbers"
+            "this drone is on the wrong side of {whom} along the line from Tx to Rx, or too close to it to tell the side: fly one of the two drones by hand until they are in the order of their numbers"
         ),
         HoldReason::Close => {
-            format!("the agreed position is too close to the present position of {whom}")
+            format!("this drone's agreed position is too close to the present position of {whom}")
         }
         HoldReason::Lost => {
             format!(
-                "a lost relay may still hover between this drone and {whom}: when it has landed, send the command `clear-lost` with its number"
+                "the drone of a lost relay may still hover between this drone and {whom}: when it has landed, send the command `clear-lost` with the number of the lost relay"
             )
         }
         HoldReason::NotFlown => {
@@ -109,7 +109,7 @@ fn describe(reason: HoldReason, whom: &str) -> String {
         }
         HoldReason::Halted => {
             format!(
-                "a relay beyond {whom} is on the wrong side of a neighbour: see the log of that relay"
+                "a relay beyond {whom} is, or may be, on the wrong side of its own neighbour: see the log of that relay"
             )
         }
     }

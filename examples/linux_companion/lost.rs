@@ -66,7 +66,7 @@ impl Lost {
         let mut words = command.split_whitespace();
         if words.next() != Some(CLEAR) {
             return Err(format!(
-                "unknown command `{command}`: allowed are `leave`, `stay` and `{CLEAR} N ..`, with the numbers of every lost relay on one side of this relay, once all of them have landed"
+                "unknown command `{command}`: allowed are `leave`, `stay` and `{CLEAR} N ..`, with the numbers of all lost relays on one side of this relay (toward Tx or toward Rx), once their drones have landed"
             ));
         }
         let named: BTreeSet<u16> = words
@@ -77,7 +77,7 @@ impl Lost {
             (_, Some(last)) if *last < self.index => Side::Upstream,
             (None, _) => {
                 return Err(format!(
-                    "{CLEAR} names no relay: when all lost relays on one side of this relay have landed, give their numbers, as in `{CLEAR} 3`"
+                    "{CLEAR} names no relay: when the drones of all lost relays on one side of this relay (toward Tx or toward Rx) have landed, give the numbers of these relays, as in `{CLEAR} 3`"
                 ));
             }
             _ => {
@@ -92,7 +92,7 @@ impl Lost {
         let missing: Vec<u16> = missing.copied().filter(|it| !named.contains(it)).collect();
         if !missing.is_empty() {
             return Err(format!(
-                "{} also lost on the same side of this relay, but not named in the command: when all of them have landed, name all their numbers in one command",
+                "{} also lost on the same side of this relay, but not named in the command: when the drones of all lost relays on this side have landed, give all their numbers in one command",
                 listed(missing)
             ));
         }

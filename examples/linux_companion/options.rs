@@ -261,7 +261,7 @@ impl BatteryOptions {
     fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
         if let Some(reserve) = self.reserve.filter(|_| !has_source) {
             return Err(format!(
-                "--reserve {reserve}: needs --positions or --autopilot, which tell the time of flight"
+                "--reserve {reserve}: needs --positions or --autopilot, which give the remaining time of flight"
             ));
         }
         let (Some(reserve), Some(full)) = (self.reserve, self.flight_time) else {
@@ -442,7 +442,7 @@ fn channel_load(options: &Options) -> Result<ChannelLoad, String> {
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
         .map_err(|full| {
             format!(
-                "--baud {}: {full}; --dead-after-ms should be three times --probe-after-ms",
+                "--baud {}: {full}; with a larger --probe-after-ms, also set --dead-after-ms to three times that value",
                 options.baud
             )
         })?;

@@ -59,9 +59,9 @@ impl Positions {
             Ok(Line::Endurance(times)) => endurance_s = Some(times),
             Err(why) => {
                 let expected = if *listens {
-                    "one of `x_m y_m altitude_m [POWER]`, `receiver POWER`, `endurance SECONDS HOME` (remaining time of flight and way home, s)"
+                    "one of `x_m y_m altitude_m [POWER]`, `receiver POWER`, `endurance SECONDS HOME` (remaining time of flight, and time of the way home, both in s)"
                 } else {
-                    "one of `x_m y_m altitude_m`, `endurance SECONDS HOME` (remaining time of flight and way home, s)"
+                    "one of `x_m y_m altitude_m`, `endurance SECONDS HOME` (remaining time of flight, and time of the way home, both in s)"
                 };
                 bad.refuse(
                     now,

@@ -37,7 +37,7 @@ pub(crate) fn resume_views(
     if let Some(bytes) = &bytes {
         stored = record(bytes, ViewRecord::LENGTH);
         let votes = stored.and_then(ViewRecord::from_bytes).ok_or_else(|| {
-            refused("the file is damaged, or not a file of votes. Before a new flight, delete the file and start again. In the same flight, the relay cannot rejoin the chain")
+            refused("the file is damaged, or has no record of votes on the chain's membership. Before a new flight, delete the file and start again. In the same flight, the relay cannot rejoin the chain")
         })?;
         relay.resume_view(now, &votes).map_err(|error| match error {
             RecordError::Base => refused(&format!(

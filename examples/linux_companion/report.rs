@@ -168,7 +168,7 @@ impl Report {
                 now,
                 "at the reserve",
                 json!({ "endurance_s": relay.endurance_s(now), "must_leave": relay.must_leave() }),
-                "the drone has only its way home and the reserve left: fly it home now",
+                "the drone's battery lasts only for the way home and the reserve: fly the drone home now",
             ),
             other => self.node_event(now, other, relay),
         }

@@ -294,7 +294,7 @@ fn clear(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, Stri
     let asked: Cleared = serde_json::from_str(body).map_err(|error| error.to_string())?;
     check_age(now, asked.time_s)?;
     let web = parts.web.as_mut();
-    let web = web.ok_or("there is no page with the relay: start the station with --web")?;
+    let web = web.ok_or("this station serves no page from which the relay could be cleared: start the station with --web")?;
     web.clear(now, asked.relay)?;
     Ok(json!({ "relay": asked.relay }).to_string())
 }

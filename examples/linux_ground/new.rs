@@ -157,7 +157,7 @@ impl NewOptions {
         let Some(line) = basis.line else {
             if y_m != 0.0 {
                 return Err(format!(
-                    "receiver at y {y_m} m: must be 0 m, because the mission has no sites: the receiver can move along the line only"
+                    "receiver at y {y_m} m: must be 0 m, because the mission has no sites (positions of Tx and Rx on earth), so the receiver can only move along the line from Tx to Rx"
                 ));
             }
             let distance_m = number(DISTANCE_M)(&x_m.to_string());
@@ -175,7 +175,7 @@ impl NewOptions {
         };
         let axis = Axis::between(line).ok();
         let site = axis.and_then(|axis| axis.point(at)).ok_or_else(|| {
-            format!("receiver at x {x_m} m, y {y_m} m: is too far from the line from Tx to Rx")
+            format!("receiver at x {x_m} m, y {y_m} m: must be at most {:.0} m from the line from Tx to Rx", Axis::AROUND_M)
         })?;
         Ok(Self {
             new_site_rx: Some(Geodetic {

@@ -204,7 +204,7 @@ impl FenceViolation {
             let below_m = if *name == "x" { f32::MIN } else { least - at };
             below_m.max(at - most)
         };
-        let who = format!("{what}; every relay with a drone refuses it");
+        let who = format!("{what}; every relay that controls a drone refuses this mission");
         let moves = moves.unwrap_or_default().iter().rev();
         match moves.max_by(|one, other| beyond_m(one).total_cmp(&beyond_m(other))) {
             Some(it) => {
@@ -214,7 +214,7 @@ impl FenceViolation {
                 } else {
                     "nearest to the limit"
                 };
-                format!("{who}: {place} is relay {index}, at {name} {at:.1} m")
+                format!("{who}: relay {index} would be {place}, at {name} {at:.1} m")
             }
             None => who,
         }

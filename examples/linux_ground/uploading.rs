@@ -234,7 +234,7 @@ impl Uploading {
         let own = digest_of(&upload);
         if digest != own {
             return Err(format!(
-                "preview {number} has the digest {own}, not {digest}"
+                "preview {number} has the digest {own}, not {digest}: give the digest of the preview to upload"
             ));
         }
         ground.request_flown(now);
@@ -279,7 +279,7 @@ impl Uploading {
         } else {
             let version = upload.version();
             failed(format!(
-                "upload of version {version} not confirmed: nothing was uploaded"
+                "upload of version {version} not confirmed by the operator: nothing was uploaded"
             ))
         };
         self.finish(ground, outcome)

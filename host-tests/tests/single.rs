@@ -110,8 +110,8 @@ fn the_first_feasible_target_is_not_the_optimum() {
 
 /// Checks one relay in constant interference against a public reference program.
 ///
-/// With Upsilon = E[1/I] of 4 (I is the interference power) and steps of 0.0001, the reference reaches an SIR of
-/// 0.0065 at x = 77.298 m.
+/// Upsilon = E[1/I] is 4 1/W; I is the interference power. With target SIRs (linear) in steps of 0.0001 the reference
+/// reaches an SIR of 0.0065 at x = 77.298 m.
 #[test]
 fn a_constant_field_agrees_with_the_reference_program() {
     let even = link(100.0, 10.0, 10.0, 1.0, vec![(0.0, 4.0)]);

@@ -146,7 +146,7 @@ impl Association {
         }
     }
 
-    /// Returns the x of the neighbour's last message with its x, m; NaN without such a message.
+    /// Returns the last x that the neighbour has sent, m; NaN if it has sent none.
     pub(super) const fn last_x_m(&self) -> f32 {
         self.seen_m
     }

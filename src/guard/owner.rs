@@ -199,9 +199,11 @@ impl FenceOwner {
         self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
-    /// Returns the distance along x that this relay and its downstream neighbour surely keep, m. The result is 0 while
-    /// a lost relay may be closer than the separation, and until the neighbour has reached its first fence (lower limit
-    /// of its x). `kept_m` is the distance that this relay and its upstream neighbour surely keep, m.
+    /// Returns the guaranteed distance along x between this relay and its downstream neighbour, m.
+    ///
+    /// The result is 0 while a lost relay may be closer to this relay than the minimum separation, and until the
+    /// neighbour has reached its first fence (lower limit of its x). `kept_m` is the guaranteed distance along x between
+    /// this relay and its upstream neighbour, m.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.passed_first_fence;
         if self.keep_out.is_near() || !is_open {

@@ -69,7 +69,7 @@ pub(crate) enum Stage {
 /// Reply of this relay to a message that the previous relay has sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Reply {
-    /// The message is completed. The reply contains its result.
+    /// Reply with the message's result: this relay knows the result, or the message was cancelled.
     Result,
     /// The message was received, and its result is not known yet.
     InProgress,

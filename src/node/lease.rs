@@ -343,8 +343,10 @@ impl Lease {
         self.bounds.other_leases(now)
     }
 
-    /// Records that this relay has accepted a view that was decided before, see [`LeaseBounds::accept`]. The relay does
-    /// not fly by this view, so its own lease and its agreement continue until the next one.
+    /// Records that this relay has accepted a view that was decided in place of the proposed one.
+    ///
+    /// See [`LeaseBounds::accept`]. The relay does not use positions of this view. So its present lease and its present
+    /// agreement on positions stay valid until it accepts the next view.
     pub(crate) fn accept_decided(&mut self, views: (ViewId, ViewId), rest: Instant) {
         self.bounds.accept(views, rest);
     }

@@ -94,7 +94,7 @@ struct WayBack {
     /// SIR of the backward hop to the next node toward Tx, times the squared hop length, m^2. The SIR is divided by r,
     /// as in [`WayBack`].
     returned: f32,
-    /// Gain A' of the backward hop from the node toward Rx to the relay.
+    /// Gain A' of the backward hop (data toward Tx) from the next node toward Rx to this relay.
     gain: f32,
 }
 

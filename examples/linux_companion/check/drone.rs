@@ -349,7 +349,7 @@ impl Drone {
                 it.name, it.wanted
             )),
             Some(it) => Err(format!(
-                "{heard_text} instead of {}: is this the right drone?",
+                "{heard_text}, but the parameter file of this relay has system {}: is this the right drone?",
                 it.wanted
             )),
             None => Ok(heard_text),
@@ -380,7 +380,7 @@ impl Drone {
         }
         if returns {
             return Err(format!(
-                "mode {number} returns or lands: choose another mode"
+                "in flight mode {number} the drone returns or lands: choose another mode"
             ));
         }
         if heard.status >= 5 {
@@ -424,7 +424,7 @@ impl Drone {
             Ok(text)
         } else {
             Err(format!(
-                "{text}, more than {} m: is this the right drone, and the right file? --start-within allows more",
+                "{text}, more than {} m: is this the right drone, and the right file? --start-within permits a larger distance",
                 self.within_m
             ))
         }
@@ -434,7 +434,9 @@ impl Drone {
         let (file, all) = match &self.file {
             Some(Ok(read)) => read,
             Some(Err(why)) => return Err(why.clone()),
-            None => return Err("the autopilot is not known yet".to_owned()),
+            None => {
+                return Err("not compared: no heartbeat of the autopilot received yet".to_owned());
+            }
         };
         let mut all: Vec<&Parameter> = all.iter().collect();
         all.sort_by(|one, other| one.name.cmp(&other.name));
@@ -504,9 +506,12 @@ fn request(name: &str, from: Address, to: Address, sequence: u8) -> FrameBytes {
 
 /// Reads the autopilot's parameter file in `folder`, the folder of the configuration.
 fn parameters(folder: Option<&Path>, kind: Kind) -> Result<(PathBuf, Vec<Parameter>), String> {
-    let name = match kind {
-        Kind::Px4 => "px4.params",
-        Kind::ArduCopter => "ardupilot.parm",
+    let (name, form) = match kind {
+        Kind::Px4 => (
+            "px4.params",
+            "SYSTEM, COMPONENT, NAME, VALUE and TYPE, separated by tabs",
+        ),
+        Kind::ArduCopter => ("ardupilot.parm", "NAME,VALUE"),
     };
     let folder =
         folder.ok_or_else(|| format!("not compared: without --config there is no {name}"))?;
@@ -523,11 +528,13 @@ fn parameters(folder: Option<&Path>, kind: Kind) -> Result<(PathBuf, Vec<Paramet
                 .get(..if kind == Kind::Px4 { 4 } else { 2 })
                 .unwrap_or_default()
             else {
-                return Err(failed(&format!("the line \"{line}\" is no parameter")));
+                return Err(failed(&format!("the line \"{line}\" must be {form}")));
             };
-            let wanted = value
-                .parse()
-                .map_err(|_| failed(&format!("the line \"{line}\" has no number")))?;
+            let wanted = value.parse().map_err(|_| {
+                failed(&format!(
+                    "the line \"{line}\": the value of {name} must be a number"
+                ))
+            })?;
             Ok(Parameter {
                 name: (*name).to_owned(),
                 wanted,

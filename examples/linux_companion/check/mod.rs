@@ -103,7 +103,7 @@ pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
             lines.push((
                 "epoch",
                 Ok(format!(
-                    "{used} is used by this check; the flight will use a later epoch"
+                    "{used} is used by this check; the flight will use a larger epoch"
                 )),
             ));
             Ok(auth)
@@ -345,7 +345,7 @@ fn rules(plan: &Plan) -> Option<Line> {
             (
                 "udev",
                 Err(format!(
-                    "{RULES} is neither beside the configuration nor in /etc/udev/rules.d"
+                    "{RULES} is neither in the folder of the configuration nor in /etc/udev/rules.d: install the bundle of this relay"
                 )),
             )
         });

@@ -210,7 +210,9 @@ impl<'s> Draw<'s> {
         number << 10 | node
     }
 
-    /// Draws fields with arbitrary values, possibly out of range. Such fields can always be encoded.
+    /// Draws fields with arbitrary values that fit into the bytes of the fields.
+    ///
+    /// The fields can always be encoded, but a receiver may reject a value as out of its range.
     pub fn arbitrary<'f>(&mut self, fields: &'f [Field]) -> Fields<'f> {
         let draw = fields.iter().map(|field| (field, self.any(&field.kind)));
         Fields(draw.collect())

@@ -62,9 +62,9 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// Returns the paper's scenario with change number `kind`; `None` for a number without a change.
+/// Returns the paper's scenario, changed in one way; `kind` is the number of the change.
 ///
-/// Number 0 is the scenario without any change.
+/// 0 is the unchanged scenario. `None` if there is no change with this number.
 fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     let paper = MissionConfig {
         relays,

@@ -64,7 +64,7 @@ impl Loss {
 /// Closest approach of two relays in the air.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
-    /// Smallest distance in the flight, m.
+    /// Distance of the two relays at their closest approach, the smallest of the flight, m.
     pub distance_m: f64,
     /// Node numbers of the two relays.
     pub relays: [u16; 2],

@@ -133,7 +133,7 @@ fn report(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
             Some((at, shares)) => {
                 let [every, members] = shares.map(|share| (share * 1_000.0).floor() / 10.0);
                 format!(
-                    "{every:.1} % of the time since {}: all {} relays had agreed, and had reported within 5 s; {members:.1} % of the time: as many relays as the last view has members",
+                    "{every:.1} % of the time since {}: all {} relays had agreed, and had reported within 5 s; {members:.1} % of the time: at least as many relays as the last view has members",
                     time(at),
                     flight.relays
                 )
@@ -187,7 +187,7 @@ fn report(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
                 None => "reference clock".to_owned(),
                 Some(0) => "own clock".to_owned(),
                 Some(common) => format!(
-                    "clock corrected by {least:+.3} to {most:+.3} s, by {common} common frames"
+                    "clock corrected by {least:+.3} to {most:+.3} s, computed from {common} frames that other files also have"
                 ),
             };
             format!("{}: {clock}", escaped(&file.name))

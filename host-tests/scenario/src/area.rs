@@ -158,7 +158,7 @@ impl Area {
         let origin = corners.first().copied().unwrap_or_default();
         let surface: f64 = edges.iter().map(|[a, b]| turn([origin, *a], *b)).sum();
         if !(surface.abs() > 2.0 * LEAST_M2) {
-            return Err(format!("has a surface of less than {LEAST_M2} m2"));
+            return Err(format!("covers less than {LEAST_M2} m2"));
         }
         for (first, one) in edges.iter().enumerate() {
             for (second, other) in edges.iter().enumerate().skip(first + 1) {

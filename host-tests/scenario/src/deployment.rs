@@ -182,7 +182,7 @@ pub fn agree(file: &str, relays: Option<u16>, planned: Option<u16>) -> Result<()
             "network.relays",
             Some(relays.to_string()),
             Problem::OtherNumber,
-            format!("{planned}, the number of relays of the plan; or leave network.relays out"),
+            format!("{planned}, the number of relays in [plan]; or leave network.relays out"),
         )),
         _ => Ok(()),
     }

@@ -893,7 +893,7 @@ fn source_areas(
             if apart_m < LEAST_APART_M {
                 let value = format!("with {site} (x = {} m, y = 0)", number(x_m));
                 let allowed = format!(
-                    "an area at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} leaves no SIR there; this one is {apart_m:.4} m from {site}"
+                    "an area at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} reduces the SIR there to 0; this one is {apart_m:.4} m from {site}"
                 );
                 return Err(mistake(
                     file,
@@ -980,7 +980,7 @@ fn near_line(
 ) -> Result<[f64; 2], ScenarioError> {
     let value = Some(format!("[{lat}, {lon}]"));
     let Some(line) = line else {
-        let allowed = "rectangle, polygon or circle with x and y, or a [site] with the geographic positions of Tx and Rx".to_owned();
+        let allowed = "a rectangle, polygon or circle given by x and y in m; or latitudes and longitudes together with a [site], the geographic positions of Tx and Rx".to_owned();
         return Err(mistake(file, key, value, Problem::NoSite, allowed));
     };
     let place = |[lat, lon]: [f64; 2]| {
@@ -1184,7 +1184,7 @@ pub(super) fn sources(
                     _ => ("x_m", format!("{}, y_m = {}", number(x_m), number(y_m))),
                 };
                 let allowed = format!(
-                    "a position at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} leaves no SIR there; this one is {apart_m:.4} m from {site}"
+                    "a position at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} reduces the SIR there to 0; this one is {apart_m:.4} m from {site}"
                 );
                 let key = format!("{table}{key}");
                 return Err(mistake(file, &key, Some(value), Problem::OutOfRange, allowed));

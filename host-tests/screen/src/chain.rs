@@ -301,7 +301,7 @@ pub(crate) fn hold_reason(report: &Report) -> Option<String> {
             HoldReason::Unheard => format!("{whom} is not engaged, or not received yet"),
             HoldReason::Order => format!("on the wrong side of {whom}, or too close to it"),
             HoldReason::Close => format!("the agreed position is too close to {whom}"),
-            HoldReason::Lost => "a lost relay may still hover on the way".to_owned(),
+            HoldReason::Lost => "the drone of a lost relay may still hover on the way".to_owned(),
             HoldReason::NotFlown => format!("{whom} is in the way, and not engaged"),
             HoldReason::Pending => format!("{whom} has not made room yet"),
             HoldReason::Halted => {

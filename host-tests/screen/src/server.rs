@@ -89,7 +89,7 @@ const MAX_TRIES: usize = 5;
 
 /// Largest number of wrong passwords in [`TRIES_TIME`] from all addresses together.
 ///
-/// When this number is reached, the server refuses the requests of all other computers.
+/// When this number is reached, the server refuses the requests of all computers except its own.
 const MAX_ALL_TRIES: usize = 100;
 
 /// Stack size of a connection's thread, bytes.

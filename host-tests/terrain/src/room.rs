@@ -34,8 +34,8 @@ struct Stretch {
 
 /// Highest and lowest ground along the line Tx-Rx: points of x, m, and height above the datum, m.
 ///
-/// Between two points of `highest` no ground is higher than these points. Between two points of `lowest` no ground is
-/// lower.
+/// Between two adjacent points of `highest` no ground is higher than the higher one of them. Between two adjacent points
+/// of `lowest` no ground is lower than the lower one.
 struct Ridge {
     /// Largest distance along x between two adjacent points.
     step_m: f64,

@@ -30,7 +30,7 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
 
 /// Returns the result and the recipient of each of the companion's answers to `MAV_CMD_USER_1`.
 ///
-/// By this command an operator reports that lost drones are gone.
+/// With this command an operator reports that the drones of lost relays have landed.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.received.iter();
     said.filter_map(|(_, said)| match said {
@@ -90,7 +90,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
         assert_eq!(vehicle.link.poll_cleared(), None);
         assert_eq!(vehicle.events, []);
         for line in [
-            "relay: denied: name all lost relays of one side",
+            "relay: denied: name all lost relays toward Tx/Rx",
             "relay: lost drones reported as gone",
         ] {
             let text = LinkMessage::Text(line.to_owned());

@@ -122,7 +122,7 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     let (status, number) = page.post("/preview", &json!({ "altitude": "50" }));
     assert_eq!((status, &number[..]), (200, "{\"preview\":1}"));
     let state = page.until("failed");
-    let why = "altitude 50 m: must be within 20 to 20 m (the relays' geofence, set before flight by --altitude and --band); every relay with a drone refuses it: farthest outside is relay 1, at altitude 50.0 m";
+    let why = "altitude 50 m: must be within 20 to 20 m (the relays' geofence, set before flight by --altitude and --band); every relay that controls a drone refuses this mission: relay 1 would be farthest outside, at altitude 50.0 m";
     assert_eq!(state["fault"], why);
     let request = json!({ "preview": 1, "digest": state["digest"] });
     assert_eq!(
@@ -232,7 +232,7 @@ fn random_previews_are_flown_as_they_were_shown() {
         200
     );
     let fault = page.until("failed")["fault"].take();
-    let why = "distance 1010 m: must be within 0 to 1000 m (the relays' geofence, set before flight by --distance); every relay with a drone refuses it: nearest to the limit is relay 2, at x ";
+    let why = "distance 1010 m: must be within 0 to 1000 m (the relays' geofence, set before flight by --distance); every relay that controls a drone refuses this mission: relay 2 would be nearest to the limit, at x ";
     assert!(fault.as_str().unwrap().starts_with(why), "{fault}");
     let (mut flown, mut refused) = (0, 0);
     while flown < count {
@@ -269,9 +269,9 @@ fn random_previews_are_flown_as_they_were_shown() {
             // The limit is named, and a relay: with Rx beyond the line of the loaded mission all positions are within it.
             let why = state["fault"].as_str().unwrap();
             let place = if body["altitude"].is_null() {
-                "nearest to the limit is relay 2, at x "
+                "relay 2 would be nearest to the limit, at x "
             } else {
-                "farthest outside is relay 1, at altitude "
+                "relay 1 would be farthest outside, at altitude "
             };
             let names = why.contains("must be within") && why.contains(place);
             assert!(names, "{body}: {why}");

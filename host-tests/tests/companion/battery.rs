@@ -258,7 +258,7 @@ fn endurance_is_read_from_the_positions() {
     assert_eq!(status()["must_leave"], true);
     let (is_done, text) = commanded(&socket, "stay\n");
     assert!(
-        is_done && text.contains("only the way home and the reserve left"),
+        is_done && text.contains("lasts only for the way home and the reserve"),
         "{text}"
     );
     let line = relay.line("\"event\":\"departure\"");

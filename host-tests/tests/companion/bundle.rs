@@ -488,7 +488,7 @@ fn a_check_names_planted_faults_of_the_autopilot() {
             "param SYSID_THISMAV 9",
         ],
         &[
-            "MAVLink system 9 instead of 2: is this the right drone?",
+            "MAVLink system 9, but the parameter file of this relay has system 2: is this the right drone?",
             "mode        the mode is OFFBOARD or GUIDED",
             "position    the autopilot reports no position",
             "parameters  FENCE_ACTION is 1 instead of 4, SYSID_THISMAV is 9 instead of 2, FENCE_TYPE is not reported by the autopilot; see ",
@@ -513,7 +513,10 @@ fn a_check_names_planted_faults_of_the_autopilot() {
     let far = "20 m from its planned place, more than 10 m";
     with(
         &[],
-        &["mode        mode 6 returns or lands", far],
+        &[
+            "mode        in flight mode 6 the drone returns or lands",
+            far,
+        ],
         &["mode pilot"],
         "--start-within 10",
     );

@@ -135,7 +135,7 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     bench.agreed();
     let more = "--new-altitude 50 --new-band 50,50 --yes";
     let (ended, error) = bench.uploads("1", more).fails(1);
-    let line = "upload of version 1 refused: altitude 50 m: must be within 20 to 40 m (the relays' geofence, set before flight by --altitude and --band); every relay with a drone refuses it: farthest outside is relay 1, at altitude 50.0 m; --no-fence uploads the mission nevertheless";
+    let line = "upload of version 1 refused: altitude 50 m: must be within 20 to 40 m (the relays' geofence, set before flight by --altitude and --band); every relay that controls a drone refuses this mission: relay 1 would be farthest outside, at altitude 50.0 m; --no-fence uploads the mission nevertheless";
     assert_eq!(error, line);
     assert_eq!(
         lines_of_event(&ended, "change")[0],
@@ -310,7 +310,7 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
     let question = "Upload version 1 of the mission? [y/N] ";
     for answer in ["n\n", "\n"] {
         let (status, shown) = at_a_terminal(&bench.options("1", new), answer);
-        let refused = "upload of version 1 not confirmed: nothing was uploaded\n";
+        let refused = "upload of version 1 not confirmed by the operator: nothing was uploaded\n";
         assert_eq!((status, shown), (Some(1), format!("{question}{refused}")));
     }
     assert!(!bench.0.relays[0].has_printed("uploaded: "));

@@ -155,7 +155,7 @@ fn an_unavailable_local_port_is_named() {
             &own,
             [
                 "is this program's own address and port",
-                "LOCAL in udp:HOST:PORT@LOCAL must differ from PORT",
+                "LOCAL within 1 to 65535 that differs from PORT",
             ],
         ),
     ] {

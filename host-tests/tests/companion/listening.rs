@@ -40,7 +40,7 @@ fn a_relay_locates_the_interferer_by_samples_from_a_fifo() {
     let receiver_dbm = 10.0 * scene.interference_rx_w().log10() + 30.0;
     writeln!(lines, "receiver {receiver_dbm} dBm").unwrap();
     write(&fifo, &lines);
-    relay.line("position: invalid line \"1 2 3 0\" in --positions is ignored: \"0\" is not a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm; a valid line is one of `x_m y_m altitude_m [POWER]`, `receiver POWER`, `endurance SECONDS HOME` (remaining time of flight and way home, s); ");
+    relay.line("position: invalid line \"1 2 3 0\" in --positions is ignored: \"0\" is not a power in W without the unit, within 1e-30 to 1e6, or in dBm with the unit, for example -95 dBm; a valid line is one of `x_m y_m altitude_m [POWER]`, `receiver POWER`, `endurance SECONDS HOME` (remaining time of flight, and time of the way home, both in s); ");
     let believed = relay.line("estimate: interferer ");
     let [power_w, x_m, y_m] = bits(&believed)[..3] else {
         panic!("{believed}");

@@ -73,7 +73,7 @@ fn invalid_position_lines_are_counted_and_logged_once() {
         &format!("x y z\n\n1 2\n1 2 3 4\n1 2 NaN\n1 2 inf\n{long}\n"),
     );
     relay.line(
-        "position: invalid line \"x y z\" in --positions is ignored: \"x\" is not a number; a valid line is one of `x_m y_m altitude_m`, `endurance SECONDS HOME` (remaining time of flight and way home, s); ",
+        "position: invalid line \"x y z\" in --positions is ignored: \"x\" is not a number; a valid line is one of `x_m y_m altitude_m`, `endurance SECONDS HOME` (remaining time of flight, and time of the way home, both in s); ",
     );
     // A line that arrives in pieces: each piece alone would be counted as an invalid line.
     write(&fifo, "900 0");

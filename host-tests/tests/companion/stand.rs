@@ -90,7 +90,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     let started = tx.line("\"event\":\"started\"");
     assert!(started.contains("\"end\":\"transmitter\""));
     rx.line("started: receiver of a chain of 3 relays, ");
-    rx.line(&format!("measurement: invalid line \"nonsense\" in --measurements {level} is ignored: \"nonsense\" is not a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm; a valid line is POWER or receiver POWER; "));
+    rx.line(&format!("measurement: invalid line \"nonsense\" in --measurements {level} is ignored: \"nonsense\" is not a power in W without the unit, within 1e-30 to 1e6, or in dBm with the unit, for example -95 dBm; a valid line is POWER or receiver POWER; "));
     let meter = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     // Notation of a spectrum analyser.
     let tx_dbm = format!("{} dBm", 10.0 * f64::log10(tx_w) + 30.0);

@@ -31,7 +31,7 @@ fn a_vanished_port_returns_and_the_other_one_goes_on() {
     for time in 1..=2_u64 {
         hub.pull(0);
         let line = relay.line(
-            "the device was disconnected; check its cable: the program opens the port again as soon as the device is back",
+            "the device was disconnected; check the cable of the device: the program opens the port again as soon as the device is back",
         );
         assert!(line.contains("port lost: --upstream "), "{line}");
         let sent = |said: &Value| said["links"]["ports"][1]["bytes_out"].as_u64().unwrap();

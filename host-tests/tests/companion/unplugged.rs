@@ -16,7 +16,7 @@ fn a_port_that_vanishes_is_opened_again() {
         let (_, sleeps) = flight.relay.cost();
         flight.drone.order("unplug");
         let line = flight.relay.line(
-            "the device was disconnected; check its cable: the program opens the port again as soon as the device is back",
+            "the device was disconnected; check the cable of the device: the program opens the port again as soon as the device is back",
         );
         assert!(line.contains("port lost: --autopilot /"), "{line}");
         flight.relay.line("autopilot: no heartbeat");
@@ -45,7 +45,7 @@ fn a_port_that_vanishes_is_opened_again() {
     flight.drone.order("unplug");
     flight
         .relay
-        .line("the device was disconnected; check its cable: the program opens the port again as soon as the device is back");
+        .line("the device was disconnected; check the cable of the device: the program opens the port again as soon as the device is back");
     flight.drone.order("reboot");
     flight.drone.forget();
     flight.drone.order("plug");

@@ -303,7 +303,7 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
             "altitude {altitude} m: must be within {range} (the relays' geofence, set before flight by --altitude and --band)"
         );
         let far = format!(
-            "every relay with a drone refuses it: farthest outside is relay 1, at altitude {altitude}.0 m"
+            "every relay that controls a drone refuses this mission: relay 1 would be farthest outside, at altitude {altitude}.0 m"
         );
         let line = ground(&chain.files, "5", &more).refused(1);
         assert_eq!(

@@ -117,7 +117,7 @@ fn a_useless_view_file_is_named_and_prevents_the_flight() {
     let other = store(&file, &voted(digest(&loaded()) ^ 1, 3, 40, true));
     let mut damaged = good.clone();
     damaged[7] ^= 1;
-    let is_damaged = "the file is damaged, or not a file of votes. Before a new flight, delete the file and start again. In the same flight, the relay cannot rejoin the chain";
+    let is_damaged = "the file is damaged, or has no record of votes on the chain's membership. Before a new flight, delete the file and start again. In the same flight, the relay cannot rejoin the chain";
     for (bytes, words) in [
         (damaged, is_damaged),
         (good[..good.len() - 1].to_vec(), is_damaged),

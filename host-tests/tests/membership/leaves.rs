@@ -289,10 +289,10 @@ fn a_departure_ends_well_if_the_relay_stays_or_dies() {
     }
 }
 
-/// Checks that the death of a relay that leaves, or of its spare, is like any loss.
+/// Checks that the chain treats the death of a leaving relay, or of its spare, as an ordinary loss.
 ///
-/// The environment variable `COUNT` has the number of random moments. Two losses in a row are longer than one: the death
-/// may be found only after the next view change.
+/// A loss during a replacement can take longer than a single loss: the chain may find the death only after the next view
+/// change. The environment variable `COUNT` has the number of random times of death.
 #[test]
 fn a_sudden_death_during_a_replacement_is_an_ordinary_loss() {
     let mut all_s = Vec::new();

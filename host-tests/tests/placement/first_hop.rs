@@ -29,9 +29,10 @@ fn first_hop(x_m: f32, distance_m: f32, altitude_m: f32) -> Hop {
     )
 }
 
-/// Checks the maximum length of a first hop whose SIR rises up to a length of 45 m, and then falls. The interferer is
-/// 10 m behind Tx, so the SIR is 1.04 above Tx and rises to 1.22. Only an interval of lengths meets the target; this
-/// interval may be beyond the longest permitted length.
+/// Checks the maximum length of a first hop whose SIR rises up to a length of 45 m, and then falls.
+///
+/// The interferer is 10 m behind Tx. With the relay directly above Tx the SIR is 1.04; at a length of 45 m it is 1.22.
+/// Only lengths within an interval meet the target. This interval may be beyond the longest permitted length.
 #[test]
 fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
     // SIR_1 is at least 1.22 from 40.9 m to 50 m.

@@ -16,9 +16,9 @@ fn sixth() -> (Bench, WireMessage) {
     (bench, sweep)
 }
 
-/// Returns a hello whose sender receives its nearest node and has chosen the neighbour `neighbour`.
+/// Returns a hello whose sender has chosen the neighbour `neighbour`, and receives the nearest node.
 ///
-/// The hello requests nothing.
+/// The hello requests no answer.
 fn hello_choosing(bench: &Bench, neighbour: u16) -> WireMessage {
     with_neighbours(1, 1, &loaded_hello(0, bench.mission, neighbour, 0))
 }

@@ -787,7 +787,7 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
     let svg = std::fs::read_to_string(folder.path().join("error.svg")).unwrap();
     roxmltree::Document::parse(&svg).unwrap();
     assert!(
-        svg.contains("Error of the interferer's position, estimated by the relays ([listen]) with the interferer at each position, "),
+        svg.contains("Error of the relays' estimate of the interferer's position ([listen]) with the interferer at each position, "),
         "{svg}"
     );
     let output = cargo_plan(folder.path(), &["--scenario", "listen.toml", "--uavs", "6"]);
@@ -1235,7 +1235,7 @@ fn wrong_areas_are_refused_by_name() {
             area("area = { circle = [100, 0, 99.9999] }"),
             [
                 "interferer[0].area = with Tx (x = 0 m, y = 0) contains a site",
-                "at least 1 m from Tx and Rx, because an interferer at Tx leaves no SIR there; this one is 0.0001 m",
+                "at least 1 m from Tx and Rx, because an interferer at Tx reduces the SIR there to 0; this one is 0.0001 m",
             ],
         ),
         (

@@ -215,7 +215,7 @@ fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
     let (status, line) = refusal("--target-rate-bps 2e7 --bandwidth-hz 1e7");
     assert_eq!(status, 1, "{line}");
     for part in [
-        "--target-rate-bps 20000000.0: no number of relays carries this rate: all hops share one frequency in equal time slots",
+        "--target-rate-bps 20000000.0: no number of relays carries this rate, if all hops share one frequency in equal time slots",
         "1 relay carries 6.58",
         "a larger bandwidth than 10000000.0 Hz",
     ] {
@@ -371,7 +371,7 @@ fn steps_of_a_radio_are_met_by_the_fewest_relays() {
     let high = linked("steps = [{ sinr_db = 80, bits_per_hz = 1 }]\n");
     let output = plan(&format!("--scenario {} --uavs 2", high.path().display()));
     let table = String::from_utf8(output.stdout).unwrap();
-    assert!(table.contains("largest data rate: 0 bit/s: the SINR of the worst hop with any number of relays is below the first of link.steps\n"), "{table}");
+    assert!(table.contains("largest data rate: 0 bit/s: the SINR of the worst hop with any number of relays is below the lowest SINR in link.steps\n"), "{table}");
 }
 
 #[test]
@@ -472,7 +472,7 @@ fn the_table_names_method_and_proof_and_a_picture_is_drawn() {
     for part in [
         "with 22 relays, by the paper's optimisation problem (Opt)",
         "fewer relays do not meet the target",
-        "up to 5.16",
+        "highest SIR of this number of relays is 5.16",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
@@ -657,14 +657,14 @@ fn a_target_in_decibels_is_answered_in_decibels() {
     let table = output_of("--target-sir-db 6");
     for part in [
         "worst hop: 6.000 dB (SIR 3.98107",
-        "target: SIR 6 dB; this number of relays reaches up to 6.",
+        "target: SIR 6 dB; the highest SIR of this number of relays is 6.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
     let table = output_of("--target-sir 4");
     for part in [
         "worst hop: SIR 4.00000",
-        "target: SIR 4; this number of relays reaches up to 4.",
+        "target: SIR 4; the highest SIR of this number of relays is 4.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }

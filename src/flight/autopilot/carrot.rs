@@ -635,7 +635,9 @@ mod tests {
         assert_eq!(other_targets(0, 20.0), 1, "reported once");
     }
 
-    /// Checks that a refusal ends when the autopilot no longer reports its target.
+    /// Checks that the autopilot counts as refusing the setpoint only while it reports its target.
+    ///
+    /// Without recent reports the refusal is unknown, and `is_refused` returns false.
     #[test]
     fn a_refusal_is_unknown_without_reports_of_the_target() {
         let axis = axis();

@@ -45,7 +45,7 @@ const OVERDUE: Duration = Duration::from_millis(600);
 const RECOVERY: Duration = Duration::from_millis(1_000);
 /// Duration used instead of [`RECOVERY`] if the position is lost twice within [`SHORT_TIME`].
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
-/// Maximum time from one loss of the position to the next for which [`LONG_RECOVERY`] applies.
+/// Time after a loss of the position. If the position is lost again within it, [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
 /// Maximum time from an ArduCopter's mode change after a geofence breach to its report of the breach.
@@ -225,7 +225,7 @@ impl Autopilot {
                 Line::info(Topic::Clearance, "relay: lost drones reported as gone")
             }
             Some(_) => {
-                let text = ["relay: denied: name all lost relays of one side", ""];
+                let text = ["relay: denied: name all lost relays toward Tx/Rx", ""];
                 Line::warning(Topic::Clearance, text)
             }
             None => return,

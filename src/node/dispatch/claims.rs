@@ -115,10 +115,11 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns a lease renewal's sequence number if `message` must be followed by a handshake.
+    /// Returns the sequence number of a lease renewal if this relay must send a handshake after `message`.
     ///
-    /// `None` otherwise. On a shared channel, one message of each lease renewal is followed by a handshake. By this
-    /// handshake a second node with the same number detects this relay, even if the chain sends no other message.
+    /// Otherwise `None`. On a shared channel each relay sends one handshake per lease renewal: the leader after its
+    /// renewal message, every other relay after its reply that the renewal is complete. By this handshake a second node
+    /// with the same node number detects this relay, even if the chain sends no other message.
     pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {
         let number = match message {
             Message::Pulse(pulse) if self.layers.neighbours.at(self.back()).has_no_peer() => {

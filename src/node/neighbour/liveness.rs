@@ -231,8 +231,9 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the silent neighbour is lost, which needs at least a silence of `dead`. `tick` is the time
-    /// until the next check.
+    /// Checks at `now` if the silent neighbour counts as lost.
+    ///
+    /// The neighbour is lost only after a silence of at least `dead`. `tick` is the time until the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

@@ -63,8 +63,8 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour; 0 if there is none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time until which no new view is requested after the selection of a neighbour. A second relay possibly selects
-    /// the same neighbour at this time, and one view change is enough for both.
+    /// End of the grace period after the selection of a neighbour. In it this relay requests no new view, because the
+    /// relay on the neighbour's other side may select the neighbour, too: one view change is enough for both.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
@@ -571,7 +571,7 @@ impl Neighbour {
     }
 }
 
-/// Neighbour on one side of the relay at the last decisions on views, as node numbers; 0 for none.
+/// Node numbers of the neighbour on one side of the relay at the latest decisions on views; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view.

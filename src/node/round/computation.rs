@@ -522,8 +522,8 @@ impl SweepPass {
 
     /// Starts this relay's part in a sweep, with the data of the previous node.
     ///
-    /// `behind` describes the previous node; `None` if that is Tx or Rx. `from` has the previous node's farthest x for
-    /// each target, m.
+    /// `behind` describes the previous node; `None` if that is Tx or Rx. `from` has, for each target SIR, the
+    /// farthest x at which the previous node meets this target, m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;

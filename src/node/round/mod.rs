@@ -370,7 +370,7 @@ const HOPS_AT_ONCE: u16 = 12;
 /// Such a hop takes twice as much computation as a hop with one interferer ([`HOPS_AT_ONCE`]).
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
-/// Leader's choice of the next pass along the chain, and its computation before the pass.
+/// Choice of the next pass along the chain, and the computation before it, both by the leader.
 impl Computation {
     /// Continues the computation for the current pass along the chain, or for the leader's next one.
     ///

@@ -58,7 +58,7 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Makes this relay the last reachable one, so that it decides the outstanding proposal.
+    /// Makes this relay the last one that the view proposal can reach, so that it decides the proposal.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);

@@ -33,8 +33,8 @@ const EXCESS: f32 = 0.03;
 /// First upper limit on the slack, the length by which a chain reaches beyond Rx. The unit is the distance from Tx to
 /// Rx. Without the limit a large slack could outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Lowest upper limit on the slack, the length by which a chain reaches beyond Rx. The unit is the distance from Tx to
-/// Rx.
+/// Value of the upper limit on the slack below which the limit is not lowered again. The slack is the length by which a
+/// chain reaches beyond Rx. The unit is the distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Factor on a negative slack (length by which a chain ends before Rx), when two chains are compared.

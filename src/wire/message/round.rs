@@ -76,8 +76,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. A measured interference or a
-    /// lateral offset is encoded before the list of farthest x.
+    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured
+    /// interference or the lateral offset, if any, precedes the list of the sender's farthest x for each target SIR.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {

@@ -29,7 +29,7 @@ pub struct Proposal {
 pub struct Poll {
     /// Newest agreed view (set of members) that any polled relay knows. Only members of this view have a vote.
     pub agreed: View,
-    /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
+    /// Number of votes for the proposal so far: one for each polled relay that is a member of `agreed`. 0 to 1000.
     pub votes: u16,
     /// True if the relay that proposed `agreed` was polled; for the initial view, if the leader was. Exactly half of
     /// the members' votes are then enough for a quorum.

@@ -54,7 +54,7 @@ impl Style {
         relays: 1..=50,
         chain: Chain::Alike,
     };
-    /// Links of 1 to 50 relays, equal or different.
+    /// Links of 1 to 50 relays. The relays of a link have equal or different powers and altitudes.
     pub const ANY: Self = Self {
         relays: 1..=50,
         chain: Chain::Any,

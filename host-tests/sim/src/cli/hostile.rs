@@ -438,7 +438,8 @@ pub struct Flight {
     /// The pilot of drone I takes over from second S until E, or permanently. Repeatable
     #[arg(long, value_name = "I@S[-E]", value_parser = takeover)]
     takeover: Vec<Takeover>,
-    /// File with the position of each drone's first hand-over, one line `index, x_m, y_m, h_m` per drone
+    /// File with the position at which each pilot first hands the drone over to its relay. One line
+    /// `index, x_m, y_m, h_m` per drone
     #[arg(long, value_name = "FILE", requires = "fly")]
     start: Option<PathBuf>,
     #[command(flatten)]

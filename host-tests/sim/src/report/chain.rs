@@ -270,7 +270,7 @@ impl ChainReport {
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
             _ = writeln!(
                 text,
-                "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {} by `{}`",
+                "worst hop: SIR {sir:.6} ({sir_db:.3} dB) with {}, method `{}`",
                 self.relays_left(),
                 self.method
             );
@@ -287,7 +287,7 @@ impl ChainReport {
             let relays = if reach == 1 { "relay" } else { "relays" };
             _ = writeln!(
                 text,
-                "one radio channel, received by {reach} {relays} on each side"
+                "one radio channel for all relays; a frame reaches {reach} {relays} on each side of its sender"
             );
         }
         match self.promised {
@@ -358,7 +358,8 @@ impl ChainReport {
         match self.version {
             None => String::new(),
             Some(0) if self.timeline.iter().any(|moment| moment.what == "adopted") => {
-                "no remaining relay uses the mission that was uploaded and adopted\n".to_owned()
+                "the relays adopted the uploaded mission, but no remaining relay uses it\n"
+                    .to_owned()
             }
             Some(0) => "the chain uses the mission that it started with: no upload was adopted\n"
                 .to_owned(),
@@ -594,7 +595,7 @@ impl AvailabilityReport {
         if let Some(most) = self.most_flying {
             _ = writeln!(
                 text,
-                "most parts of the chain with separate agreements at the same time: {most}"
+                "largest number of parts of the chain with separate agreements at the same time: {most}"
             );
         }
         if let Some(least) = self.least_separation_m {

@@ -152,9 +152,10 @@ impl RotationReport {
         row("hours after the chain was complete", &|it| {
             format!("{:.2}", it.watched_s / 3_600.0)
         });
-        row(&format!("time below {GOOD} of the optimum, %"), &|it| {
-            format!("{:.4}", 100.0 * it.below)
-        });
+        row(
+            &format!("time with an SIR below {GOOD} of the optimum, %"),
+            &|it| format!("{:.4}", 100.0 * it.below),
+        );
         let causes = self.figures().flat_map(|it| it.below_s.keys());
         for cause in causes.collect::<std::collections::BTreeSet<_>>() {
             row(&format!("  {}, s", cause.name()), &|it| {
@@ -189,7 +190,7 @@ impl RotationReport {
         row("time of the smallest distance, s", &|it| {
             some(it.nearest_at_s, 1)
         });
-        row("most parts of the chain with separate agreements", &|it| {
+        row("largest number of parts with separate agreements", &|it| {
             it.chains.to_string()
         });
         if self.unannounced.is_some() {
@@ -200,7 +201,7 @@ impl RotationReport {
                 let [[x, y, h], [to_x, to_y, to_h]] = [drone.at_m, drone.goal_m];
                 _ = writeln!(
                     text,
-                    "smallest distance: relay {} at ({x:.1}, {y:.1}, {h:.1}) m, flies to ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
+                    "smallest distance: relay {} at ({x:.1}, {y:.1}, {h:.1}) m, on its way to ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
                     drone.relay, drone.state
                 );
             }
@@ -255,7 +256,11 @@ impl RotationRuns {
         let all = self.total();
         line("all", &all);
         for (cause, span_s) in &all.below_s {
-            _ = writeln!(text, "below {GOOD}, {}: {span_s:.1} s", cause.name());
+            _ = writeln!(
+                text,
+                "SIR below {GOOD} of the optimum for {span_s:.1} s: {}",
+                cause.name()
+            );
         }
         text
     }

@@ -291,7 +291,7 @@ impl FlowReport {
         let queues: Vec<String> = queues.into_iter().take(shown).map(queue).collect();
         _ = writeln!(
             text,
-            "    {which} in packets, mean (largest): {}",
+            "    {which}, mean length (largest length) in packets: {}",
             queues.join(", ")
         );
         text

@@ -177,7 +177,7 @@ impl DipCause {
             Self::NoSpare => "too few relays, no spare",
             Self::SpareWaits => "too few relays, a spare waits",
             Self::Agreement => "view, lease or positions not agreed",
-            Self::Guard => "guard keeps a drone off its position",
+            Self::Guard => "collision avoidance holds a drone back",
             Self::Motion => "drones fly to their positions",
             Self::Positions => "agreed positions",
         }

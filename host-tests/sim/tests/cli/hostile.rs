@@ -64,7 +64,7 @@ fn the_timeline_of_a_loss_has_a_line_per_event() {
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [
         "4      379.452      20.00       silent",
-        "with 7 of 8 relays by `align`",
+        "with 7 of 8 relays, method `align`",
         "one radio channel",
         "20.000 s  relay 4 went silent",
         " s  relays 3 and 5: relay 4 lost (no reply)",
@@ -190,8 +190,9 @@ fn the_report_has_the_reach_of_the_shared_channel() {
     ] {
         let options = format!("--uavs 4 --loss 0.2 {extra}");
         assert_eq!(json(&options)["reach"].as_u64(), reach, "{extra}");
-        let line = "one radio channel, received by";
-        let expected = reach.map(|reach| format!("{line} {reach} relays on each side"));
+        let line = "one radio channel for all relays; a frame reaches";
+        let expected =
+            reach.map(|reach| format!("{line} {reach} relays on each side of its sender"));
         let text = String::from_utf8(chain(&options).stdout).unwrap();
         let printed = text.lines().find(|printed| printed.starts_with(line));
         assert_eq!(printed, expected.as_deref(), "{extra}");

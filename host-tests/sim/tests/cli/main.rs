@@ -103,7 +103,7 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
     assert!(output.status.success() && output.stderr.is_empty());
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
-        table.contains("worst hop: SIR 2.4655") && table.contains("8 relays by `align`"),
+        table.contains("worst hop: SIR 2.4655") && table.contains("8 relays, method `align`"),
         "{table}"
     );
     assert!(
@@ -121,7 +121,7 @@ fn the_table_has_y_if_lateral_offsets_are_allowed() {
     let table = |arguments: &str| String::from_utf8(chain(arguments).stdout).unwrap();
     let beside = table(&format!("--scenario {side} --uavs 2 --method altitude"));
     assert!(
-        beside.contains("y [m]") && beside.contains("by `joint`"),
+        beside.contains("y [m]") && beside.contains("method `joint`"),
         "{beside}"
     );
     assert!(!table("--uavs 2").contains("y [m]"));

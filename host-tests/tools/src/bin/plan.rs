@@ -433,7 +433,7 @@ fn too_fast(rates: &RateReport) -> String {
         "every hop has a frequency of its own"
     };
     format!(
-        "--target-rate-bps {target_bps:?}: {among} carries this rate: {shared}; {}. Give a lower rate, or a larger bandwidth than {:?} Hz",
+        "--target-rate-bps {target_bps:?}: {among} carries this rate, if {shared}; {}. Give a lower rate, or a larger bandwidth than {:?} Hz",
         rates.largest(),
         rates.bandwidth_hz
     )

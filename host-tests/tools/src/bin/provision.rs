@@ -282,7 +282,7 @@ impl<'a> Asked<'a> {
             let line = format!("{}: {}", self.name, flown.describe());
             if flown.stand_in && !self.options.stand_in {
                 return Err(format!(
-                    "{line}; with --stand-in the files are written, for relays that use the hypothetical interferer"
+                    "{line}; to write the files nevertheless, give --stand-in: the relays then compute with the hypothetical interferer"
                 ));
             }
             command::print_line(&line);

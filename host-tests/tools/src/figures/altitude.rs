@@ -179,7 +179,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
                 .to_owned(),
         ],
         taken: vec![
-            "D = 1000 m, p_t = p_MSI = 80 W, p_u = 1 W, X = 500 m, N = 50, relays at least 4 m \
+            "D (Tx to Rx) = 1000 m, p_t (Tx) = p_MSI (interferer) = 80 W, p_u (relay) = 1 W, X = 500 m, N = 50 relays, relays at least 4 m \
              apart"
                 .to_owned(),
             "the offsets Y are not in the paper's text, except 150 m".to_owned(),

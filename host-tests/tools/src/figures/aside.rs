@@ -124,7 +124,7 @@ fn gain(offset: u16) -> Result<PowerRatio, FigureError> {
 fn taken() -> Vec<String> {
     let (low, high) = ALTITUDES_M;
     vec![format!(
-        "D = 1000 m, p_t = p_MSI = 80 W, p_u = {RELAY_W} W, interferer at (500, Y) m, altitudes of {low} m to {high} m"
+        "D (Tx to Rx) = 1000 m, p_t (Tx) = p_MSI (interferer) = 80 W, p_u (relay) = {RELAY_W} W, interferer at (500, Y) m, altitudes of {low} m to {high} m"
     )]
 }
 

@@ -50,7 +50,9 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects the passes of messages that the figure draws: more of the last passes than of the first.
+/// Selects the sweeps that the figure shows, more densely toward the end.
+///
+/// A sweep is a pass of messages along the chain. The selected sweeps are the first sweep, every 100th, every 10th of the last 1000, and the last 20.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()
@@ -113,7 +115,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
             format!("Settled: {}.", ends.join("; ")),
         ],
         taken: vec![
-            "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) m, \
+            "D (Tx to Rx) = 1000 m, h (altitude) = 20 m, p_t (Tx) = p_MSI (interferer) = 80 W, p_u (relay) = 1 W, interferer at (500, 400) m, \
              step 0.1 linear SIR"
                 .to_owned(),
             "the numbers of relays are not in the paper's text".to_owned(),

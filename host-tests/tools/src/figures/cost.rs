@@ -105,7 +105,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
             "With 100 relays the paper's schedule takes {ratio:.0} times as many messages as a leader that first solves the chain from the mission. A single relay sends no messages."
         )],
         taken: vec![
-            "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) m, \
+            "D (Tx to Rx) = 1000 m, h (altitude) = 20 m, p_t (Tx) = p_MSI (interferer) = 80 W, p_u (relay) = 1 W, interferer at (500, 400) m, \
              relays at least 4 m apart"
                 .to_owned(),
             "simulated serial links without faults; counted are all frames on all links, replies and retransmissions included"

@@ -113,12 +113,12 @@ pub fn by_place_sheet() -> Result<Sheet, FigureError> {
         name: "fewest-by-place",
         title: "Minimum number of relays for a target SIR, by the interferer's position",
         says: vec![format!(
-            "The nearer the interferer to the line between Tx and Rx, the more relays are needed. The paper says so of an interferer near Tx or Rx, which holds only for low targets, and only near Rx: for a target of 1 and Y = 100 m, X = 500 m, 100 m and 900 m need {low}, \
-             {low_tx} and {low_rx} relays; for a target of 5 it is {close}, {close_tx} and \
-             {close_rx}, and with Y = 400 m {middle}, {near_tx} and {near_rx}."
+            "The nearer the interferer to the line between Tx and Rx, the more relays are needed. The paper says that an interferer near Tx or Rx also needs more relays. This holds only near Rx, and only for low targets. Relays needed with the interferer at X = 500 m, 100 m and 900 m: for a target of 1 at Y = 100 m {low}, \
+             {low_tx} and {low_rx}; for a target of 5 at Y = 100 m {close}, {close_tx} and \
+             {close_rx}, and at Y = 400 m {middle}, {near_tx} and {near_rx}."
         )],
         taken: vec![
-            "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, no least separation".to_owned(),
+            "D (Tx to Rx) = 1000 m, h (altitude) = 20 m, p_t (Tx) = p_MSI (interferer) = 80 W, p_u (relay) = 1 W, no least separation".to_owned(),
             "the paper does not state the positions of the interferer: those in the legend are chosen"
                 .to_owned(),
         ],
@@ -143,7 +143,7 @@ pub fn by_power_sheet() -> Result<Sheet, FigureError> {
             .to_owned(),
         ],
         taken: vec![
-            "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, interferer at (500, 400) m, no least \
+            "D (Tx to Rx) = 1000 m, h (altitude) = 20 m, p_t (Tx) = p_MSI (interferer) = 80 W, interferer at (500, 400) m, no least \
              separation"
                 .to_owned(),
             "the paper does not state the powers: those in the legend are chosen".to_owned(),

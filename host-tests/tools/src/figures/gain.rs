@@ -92,7 +92,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         title: "Gain of Algorithm 1 over placements that ignore the interferer",
         says: vec![[8, 50, 100].map(of).join("; ") + "."],
         taken: vec![
-            "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) \
+            "D (Tx to Rx) = 1000 m, h (altitude) = 20 m, p_t (Tx) = p_MSI (interferer) = 80 W, p_u (relay) = 1 W, interferer at (500, 400) \
              m"
             .to_owned(),
             format!(

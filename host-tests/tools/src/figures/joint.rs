@@ -115,7 +115,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
                 .to_owned(),
         ],
         taken: vec![
-            "D = 1000 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 150) m, altitudes of \
+            "D (Tx to Rx) = 1000 m, p_t (Tx) = p_MSI (interferer) = 80 W, p_u (relay) = 1 W, interferer at (500, 150) m, altitudes of \
              20 m to 300 m, relays at least 4 m apart"
                 .to_owned(),
             format!(

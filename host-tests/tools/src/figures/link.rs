@@ -107,7 +107,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         let row = rows.iter().find(|row| row.relays == relays);
         row.map_or_else(String::new, |row| {
             format!(
-                "N = {relays}: SIR {:.3} one way, {:.3} both ways, and {:.3} both ways at the places for one",
+                "N = {relays}: SIR {:.3} one way, {:.3} both ways, and {:.3} both ways at the positions that are best one way",
                 row.one_way_sir_linear, row.both_ways_sir_linear, row.judged_sir_linear
             )
         })
@@ -116,15 +116,15 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         name: "link",
         title: "SIR and data rate over the number of relays, one way and both ways",
         says: vec![
-            "Not in the paper. On one frequency the hops share the time: more relays raise the SIR, and a single one carries the most. Both \
-             ways each direction has half of the time; slots as long as each hop needs carry more."
+            "Not in the paper. On one frequency the hops share the time: more relays raise the SIR, and a single relay carries the highest data rate. With \
+             data both ways, each direction has half of the time. Slots as long as each hop needs (fitted slots) carry more than equal slots."
                 .to_owned(),
             [1, 8, 24].map(of).join("; ") + ".",
         ],
         taken: vec![
-            "D = 1000 m, h = 20 m, p_t = p_rx = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) m".to_owned(),
-            "both ways: r = 1, so the worse of both directions counts; rates by log2(1 + SIR), of each direction".to_owned(),
-            "places of the largest SIR, for equal slots; of the largest rate, for fitted slots".to_owned(),
+            "D (Tx to Rx) = 1000 m, h (altitude) = 20 m, p_t (Tx) = p_rx (Rx) = p_MSI (interferer) = 80 W, p_u (relay) = 1 W, interferer at (500, 400) m".to_owned(),
+            "both ways: both directions need the same SIR (r = 1), so the worse direction counts; each direction has the data rate log2(1 + SIR)".to_owned(),
+            "equal slots: the relays are at the positions with the highest SIR; fitted slots: at those with the highest data rate".to_owned(),
         ],
         chart: Chart {
             panels: vec![

@@ -105,7 +105,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
                 .to_owned(),
         ],
         taken: vec![
-            "p_u = 1 W, D = 35 m; the power of the interferer cancels".to_owned(),
+            "p_u (relay) = 1 W, D (Tx to Rx) = 35 m; the power of the interferer cancels".to_owned(),
             "the paper does not state p_t and the positions of the interferer: 20 W and 40 W, and (X, Y) as in the legend, are chosen"
                 .to_owned(),
         ],

@@ -307,9 +307,9 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
         format!(
             "The paper prints average gains of {random} % over random and {blind} % over the \
              blind method, and up to {PRINTED_LARGEST_PERCENT} %, for powers that it does not \
-             print. Of {} choices of p_t and p_u in {} readings each, {} come within {NEAR} \
-             percentage points of both averages, and {} with the middle between Tx and Rx in \
-             place of the blind method.",
+             print. Of {} choices of p_t and p_u, each evaluated with {} definitions of the \
+             average gain, {} come within {NEAR} percentage points of both averages; with the \
+             middle between Tx and Rx in place of the blind method it is {}.",
             gains.len() / READINGS.len(),
             READINGS.len(),
             near(false),
@@ -338,7 +338,7 @@ fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
         "over random, %",
         "over blind, %",
         "over the middle, %",
-        "at most over random, over blind, %",
+        "largest gain over random, over blind, %",
     ];
     let percent =
         |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1}"));
@@ -422,8 +422,8 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         title: "Single relay at its best position, by altitude",
         says,
         taken: vec![
-            "D = 35 m, p_MSI = 20 W, interferer at (30, 30) m".to_owned(),
-            "the paper does not state p_t and p_u: those above the panels are chosen, the first near the printed averages, the second with the blind position right above Rx at every altitude"
+            "D (Tx to Rx) = 35 m, p_MSI = 20 W (interferer), interferer at (30, 30) m".to_owned(),
+            "the paper does not state p_t and p_u: the powers above the panels are our choice; those of the first panel give gains near the printed averages, with those of the second the blind position is right above Rx at every altitude"
                 .to_owned(),
             format!(
                 "random: mean SIR over {DRAWS} positions uniform in [0, D] (seed {SEED} + altitude in m), shown as the dB of that mean"

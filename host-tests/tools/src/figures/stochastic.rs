@@ -216,7 +216,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
                 .to_owned(),
         ],
         taken: vec![
-            "D = 1000 m, h = 20 m, p_t = 80 W, p_u = 1 W, step 0.1 linear SIR; Lambda = 1 / (eta \
+            "D (Tx to Rx) = 1000 m, h (altitude) = 20 m, p_t (Tx) = 80 W, p_u (relay) = 1 W, step 0.1 linear SIR; Lambda = 1 / (eta \
              h^2)"
                 .to_owned(),
             "Upsilon = (alpha + beta - 1) / ((alpha - 1) I_max); the paper prints (alpha + beta) \

@@ -266,8 +266,9 @@ struct Reach {
 impl<'a> Stages<'a> {
     /// Computes the feasible positions of each relay for the SIR `target` (linear, > 0).
     ///
-    /// The distance of two relays is at least `apart` metres. `None` if a relay has no feasible position. The cost is a
-    /// scan of the sampled positions for each change of power along the chain, and a few intervals for each relay.
+    /// The distance of two relays is at least `apart` metres. `None` if a relay has no feasible position. The
+    /// sampled positions are scanned once for each group of successive relays with equal power. Each relay adds the
+    /// work for a few intervals.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
         let (last, others) = line.scene.relays.split_last()?;
         let mut spans = vec![Span {

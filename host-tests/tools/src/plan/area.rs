@@ -868,7 +868,7 @@ impl AreaReport {
             .collect();
         let centre = self.centre.map_or_else(|| "none".to_owned(), say);
         format!(
-            "area: {}\nworst position of the interferer: {}\nthe plan for the middle of the area: {centre}\n",
+            "area of the interferer: {}\nworst position of the interferer: {}\na plan for an interferer in the middle of the area: {centre}\n",
             say(self.plan),
             places.join("; ")
         )

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use geojson::{Feature, FeatureCollection, Geometry, GeometryValue, JsonObject};
+use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Placement};
 use uav_relay_scenario::{Line, Scenario};
 
@@ -68,7 +69,7 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell], shown: Shown) -> St
     let colour = |number: f64| colour((number - least) / (most - least));
     let what = match shown {
         Shown::Sir => "SIR of the worst hop",
-        Shown::Error => "Error of the interferer's position, estimated by the relays ([listen])",
+        Shown::Error => "Error of the relays' estimate of the interferer's position ([listen])",
     };
     let range = format!("{} to {}", shown.say(least), shown.say(most));
     let relays = plan
@@ -203,7 +204,8 @@ pub fn geojson(line: &Line, cells: &[Cell]) -> Result<String, String> {
         };
         let Geodetic { lat_e7, lon_e7, .. } = line.axis.point(place).ok_or_else(|| {
             format!(
-                "x = {x:.1} m, y = {y:.1} m is too far from the line for geographic coordinates"
+                "x = {x:.1} m, y = {y:.1} m: must be at most {:.0} m from the line from Tx to Rx",
+                Axis::AROUND_M
             )
         })?;
         Ok(vec![f64::from(lon_e7) / 1e7, f64::from(lat_e7) / 1e7])

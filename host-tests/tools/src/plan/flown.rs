@@ -176,9 +176,9 @@ pub fn with_plan(text: &str, planned: &Planned) -> Result<String, String> {
     let mut file = document(text)?;
     _ = file.remove("plan");
     let mut table = Table::new();
-    table
-        .decor_mut()
-        .set_prefix("\n# By `cargo plan`. If you change anything above, run `cargo plan` again.\n");
+    table.decor_mut().set_prefix(
+        "\n# Written by `cargo plan`. If you change anything above, run `cargo plan` again.\n",
+    );
     table.insert("uavs", value(i64::from(planned.uavs)));
     table.insert("method", value(planned.method.name()));
     table.insert("tolerance", value(planned.tolerance));

@@ -299,7 +299,7 @@ impl fmt::Display for Locating {
             });
             writeln!(
                 f,
-                "simulated with the interferer at x = {x:.1} m, y = {y:.1} m: first estimate {}; relays within 1 dB of the best SIR {}{off}",
+                "simulated with the interferer at x = {x:.1} m, y = {y:.1} m: first estimate {}; SIR of the worst hop within 1 dB of the best {}{off}",
                 seconds(one.estimate_s),
                 seconds(one.placed_s)
             )?;

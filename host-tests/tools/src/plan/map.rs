@@ -5,6 +5,7 @@ use std::{fmt, io};
 use geojson::{FeatureCollection, Geometry, GeometryValue, JsonObject};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
+use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Placement};
 use uav_relay_scenario::{Line, Scenario};
 use uav_relay_terrain::profile::State;
@@ -91,8 +92,12 @@ impl Map {
         let mut features = vec![site("Tx", "tx", tx), site("Rx", "rx", rx)];
         let mut ends = vec![tx];
         for (index, (place, profile)) in (1..).zip(&plan.places) {
-            let at = point(line, *place)
-                .ok_or_else(|| format!("relay {index} is too far from the line"))?;
+            let at = point(line, *place).ok_or_else(|| {
+                format!(
+                    "relay {index}: must be at most {:.0} m from the line from Tx to Rx",
+                    Axis::AROUND_M
+                )
+            })?;
             ends.push(at);
             features.push(Feature {
                 name: format!("relay {index}"),

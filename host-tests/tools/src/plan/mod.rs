@@ -219,7 +219,7 @@ pub enum Why {
         target: f64,
         /// Best SIR found for the worst hop, linear.
         most: f64,
-        /// Number of relays with the best SIR found; `None` if an untried number might do better.
+        /// Number of relays that reaches the SIR `most`; `None` if an untried number might do better.
         relays: Option<u16>,
     },
 }

@@ -186,7 +186,7 @@ impl RateReport {
                 format!("1 to {tried_uavs}")
             };
             return format!(
-                "largest data rate: 0 bit/s: the SINR of the worst hop with {any} relays is below the first of link.steps"
+                "largest data rate: 0 bit/s: the SINR of the worst hop with {any} relays is below the lowest SINR in link.steps"
             );
         }
         let (relays, verb) = relays_carry(best_uavs);
@@ -581,7 +581,7 @@ impl PlanReport {
             let most = unit.say(most);
             _ = writeln!(
                 text,
-                "target: SIR {target}; this number of relays reaches up to {most} (--uavs {uavs})"
+                "target: SIR {target}; the highest SIR of this number of relays is {most} (--uavs {uavs})"
             );
         }
         if let Some(area) = &self.area {

@@ -434,7 +434,7 @@ pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
             "the drone goes to the better of two places: where both hops are equally good, before the point of the strongest interference; or directly above Rx"
         }
         PlaceCase::OverValley => {
-            "the drone goes directly above Rx: its first hop is better than the second even where the interference is worst"
+            "the drone goes directly above Rx: its first hop is better than the second even at the point of the strongest interference"
         }
         PlaceCase::Hilltop => {
             "the drone goes to where its first hop is best, because even there the first hop is weaker than the second"

@@ -42,7 +42,7 @@ const SLACK: f64 = 0.0023;
 const GAIN: f64 = 1e-4;
 
 /// Explanation of "room" for the user.
-pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, no clear hop becomes grazing (ground in the first Fresnel zone), and no relay is in a no-fly area; none: a drift by the position error is too much";
+pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, no clear hop becomes grazing (ground in the first Fresnel zone), and no relay is in a no-fly area; a relay whose room is none may not drift even by the position error";
 
 /// Scenario with altitudes, the positions that relays choose in it, and the rank of these positions.
 ///

@@ -37,7 +37,7 @@ impl fmt::Display for BlockError {
             Self::Refused(refusal) => refusal.fmt(f),
             Self::Points(points) => write!(
                 f,
-                "the field has {points} points: a drone's block holds at most {MAX_POINTS}"
+                "the interference field ([field]) has {points} points: a drone's configuration block holds at most {MAX_POINTS}"
             ),
             Self::Config(ConfigError::Index) => {
                 f.write_str("the relay's index must be within 1 to the number of relays")

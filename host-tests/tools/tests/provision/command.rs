@@ -448,7 +448,10 @@ fn all_or_none_is_written() {
         dir.display()
     );
     let line = refusal(&wide);
-    assert!(line.contains("a drone's block holds at most 16"), "{line}");
+    assert!(
+        line.contains("a drone's configuration block holds at most 16"),
+        "{line}"
+    );
     assert!(!dir.exists());
     // A folder named like a block cannot be replaced. Files that were renamed before are removed again.
     std::fs::create_dir_all(dir.join("relay2.bin/inside")).unwrap();
@@ -614,7 +617,7 @@ fn a_plan_and_a_network_of_different_sizes_are_refused() {
     let drone = for_the_firmware(&drone).replace("key_file", "# key_file");
     std::fs::write(&scenario, drone.replace("relays = 3", "relays = 4")).unwrap();
     let words =
-        "network.relays = 4 contradicts plan.uavs; allowed: 6, the number of relays of the plan";
+        "network.relays = 4 contradicts plan.uavs; allowed: 6, the number of relays in [plan]";
     for wanted in ["--uavs 6", "--target-sir-db 3"] {
         let arguments = format!("--scenario {scenario} --out {file} {wanted}");
         let output = plan(&arguments);

@@ -106,8 +106,10 @@ impl LogGains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. The unit of interference and
-    /// noise is the interferer's power received at the distance D from Tx to Rx.
+    /// Returns ln q at the position `at`; q is the inverse of interference plus noise.
+    ///
+    /// The unit of interference and noise is the power that is received from the interferer at a distance of D from it,
+    /// where D is the distance from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;

@@ -481,7 +481,7 @@ mod tests {
             fewer += u32::from(portions < more);
         }
         std::println!(
-            "portions of work: {kept} if the best chain is stored, {again} if it is computed again; storing takes fewer portions in {fewer} of {count} missions"
+            "calls of the solver until the result: {kept} if the best chain is stored, {again} if it is computed again; storing takes fewer calls in {fewer} of {count} missions"
         );
         assert!(fewer * 2 > count);
     }

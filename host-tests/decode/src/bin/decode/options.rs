@@ -11,7 +11,8 @@ use clap::Parser;
     disable_version_flag = true
 )]
 pub(crate) struct Options {
-    /// Capture (pcapng), or bytes of a port. By default or with `-` standard input, as of `cat /dev/ttyUSB0`
+    /// Capture file (pcapng), or file with the bytes that a port received. Without FILE, or with `-`, they are read from standard
+    /// input, for example `cat /dev/ttyUSB0 | cargo decode`
     #[arg(value_name = "FILE")]
     pub(crate) file: Option<PathBuf>,
     /// Print one JSON object per frame and line. Numbers are as on the wire

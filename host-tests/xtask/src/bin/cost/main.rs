@@ -215,7 +215,9 @@ fn with(
     })
 }
 
-/// Returns the README's table rows that state costs. Each has a fixed beginning, and a text with the measured costs.
+/// Returns the four cost rows of the README's table. Each is a pair: the first cell, and the text of the second cell.
+///
+/// The text of the second cell has the measured costs. `None` if `rows` lacks a cost.
 fn lines(rows: &[Row]) -> Option<[(&'static str, String); 4]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;
