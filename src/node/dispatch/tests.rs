@@ -1,6 +1,6 @@
 //! Tests of one relay: received messages, and its replies and events.
 
-use crate::event::Event;
+use crate::event::{Event, NodeEvent};
 #[cfg(feature = "departures")]
 use crate::guard::{self, Guard};
 use crate::mission::tests::paper;
@@ -518,5 +518,29 @@ fn an_order_to_leave_comes_before_the_relays_own_request() {
         node.steer(NOW);
         let leaver = node.steering.known_guard().map(Guard::leaver);
         assert_eq!(leaver, Some(expected));
+    }
+}
+
+/// Checks that the refusal of a ground station is reported at any distance from which its frames are accepted.
+///
+/// It is reported once a minute, and again after a frame with a new epoch.
+#[test]
+fn a_station_with_an_old_epoch_is_reported_at_any_distance() {
+    for index in 1..=8 {
+        let mut node = relay_of(Mission::try_new(paper(8)).unwrap(), index, true);
+        events(&mut node);
+        for (station, side) in [(0, Side::Upstream), (9, Side::Downstream)] {
+            let told = |node: &mut Node, reason| {
+                node.refuse(NOW, side, station, reason);
+                events(node).len()
+            };
+            assert_eq!(told(&mut node, NodeEvent::Epoch), 1, "{index} {station}");
+            assert_eq!(told(&mut node, NodeEvent::Epoch), 0, "{index} {station}");
+            assert_eq!(told(&mut node, NodeEvent::Mission), 1, "{index} {station}");
+            node.on_key_match(side, station);
+            assert_eq!(told(&mut node, NodeEvent::Epoch), 1, "{index} {station}");
+            assert_eq!(told(&mut node, NodeEvent::Mission), 0, "{index} {station}");
+        }
+        assert_eq!(node.refusals(NOW), [0; 2]);
     }
 }
