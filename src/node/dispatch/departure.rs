@@ -10,7 +10,7 @@
 //! | order to leave; both neighbours have selected the relay beyond (the only one at an end) | go outside; keep the setpoint |
 //! | order for the neighbour to leave, received by all | ask the nodes beyond it for a hello; at the end of the chain: give up the neighbour |
 //! | hello of the node beyond the neighbour that is ordered to leave | select it |
-//! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
+//! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up, or call it if it is a spare that the view still has |
 //! | outside, hello of a member: it has a neighbour beyond this relay in a later view, which is complete and in place | raise `MayLeave` |
 //! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost; without endurance only by `stay` |
 
@@ -91,9 +91,9 @@ pub(crate) struct Leaving {
     ///
     /// At a spare that has not joined yet: time of the first call.
     ordered_at: Option<Instant>,
-    /// Time at which this relay follows the last orders again.
+    /// Time at which this relay follows the last orders again. At a spare that waits outside: end of its call.
     ///
-    /// It is 0 if the orders name no relay and this relay requests nothing.
+    /// It is 0 if the orders name no relay, this relay requests nothing, and is not called.
     repeat_at: Instant,
     /// Last reported position of the drone; `None` until a position is reported.
     place: Option<Placement>,
@@ -351,7 +351,8 @@ impl Node {
         leaving.free = false;
         leaving.end_order();
         for side in [Side::Upstream, Side::Downstream] {
-            self.layers.neighbours.at_mut(side).give_up(now, false);
+            let ends = !self.member.is_relay(self.member.beyond(side, 1));
+            self.layers.neighbours.at_mut(side).give_up(now, ends);
             self.layers.neighbours.at_mut(side).forget_losses(now);
         }
         if self.layers.round.is_idle() {
@@ -411,11 +412,23 @@ impl Node {
         }
     }
 
-    /// Returns true if the leader calls node `to` at `side`, outside of the chain, to join the chain.
+    /// Returns true if node `to` at `side`, outside of the chain, is called to join the chain.
+    ///
+    /// The leader calls a spare. A relay that searches for its neighbour does not pass the call on, because it may look
+    /// like the end of the chain. A spare that is still this relay's neighbour in the view has restarted, and is called
+    /// at once.
     pub(super) fn calls_to_join(&self, side: Side, to: u16) -> bool {
-        self.layers.lease.orders().joiner == to
-            && self.is_beside(side, to)
-            && !self.steering.has_lost(side)
+        let (lease, neighbour) = (&self.layers.lease, self.layers.neighbours.at(side));
+        let is_called = if neighbour.node() == to {
+            let distance = to.abs_diff(self.member.node);
+            neighbour.is_agreed() && neighbour.selected_by(distance) == 0
+        } else {
+            lease.orders().joiner == to
+                && self.is_beside(side, to)
+                && (neighbour.is_mutual() || neighbour.has_no_peer())
+                && !self.steering.has_lost(side)
+        };
+        is_called && lease.until().is_some()
     }
 
     /// Updates the position that this relay must reach to report that it is in place. `destination` is the position to
@@ -460,6 +473,9 @@ impl Node {
         let names_relay = orders.leaver != 0 || orders.joiner != 0;
         if !waits && !names_relay {
             leaving.repeat_at = Instant::ZERO;
+            if leaving.is_spare() {
+                leaving.end_order();
+            }
         } else if leaving.repeat_at <= now {
             leaving.repeat_at = now + self.member.settings.hop_time.times(REPEATED_AFTER);
         }
@@ -568,12 +584,17 @@ impl Node {
                             .at_mut(side.other())
                             .give_up(now, true);
                     }
+                } else {
+                    // Without a further call until then, the next one is a new call.
+                    self.layers.leaving.repeat_at = now + settings.dead_after;
                 }
             }
             return true;
         }
         if hello.outside && hello.fresh {
-            if is_neighbour {
+            if is_neighbour && hello.ready && self.calls_to_join(side, from) {
+                self.schedule_hello(side, from, false);
+            } else if is_neighbour {
                 self.layers.neighbours.at_mut(side).give_up(now, false);
                 self.steering.set_neighbour(side, None);
             } else if !hello.ready {
@@ -582,8 +603,13 @@ impl Node {
                 // A spare that requests to leave is one no longer.
                 leaving.heard_spare = leaving.heard_spare.filter(|(node, _)| *node != from);
             } else if self.is_beside(side, from) && !self.steering.has_lost(side) {
-                // Beside a lost drone that may still hover, a spare could fly into it.
-                self.layers.leaving.heard_spare = Some((from, now));
+                // Beside a lost drone that may still hover, a spare could fly into it. Of several spares the called one
+                // counts, else the one that was received first.
+                let called = self.layers.lease.orders().joiner;
+                let known = self.layers.leaving.spare(now, &settings);
+                if [0, from].contains(&known) || called == from {
+                    self.layers.leaving.heard_spare = Some((from, now));
+                }
             }
             return true;
         }

@@ -521,6 +521,36 @@ fn an_order_to_leave_comes_before_the_relays_own_request() {
     }
 }
 
+/// Checks that a second call gives the drone of a spare time to hover, as the first call does.
+#[cfg(feature = "departures")]
+#[test]
+fn the_limit_of_a_second_call_starts_anew() {
+    let settings = Settings {
+        wiring: Wiring::Shared,
+        guard: Some(guard::tests::config()),
+        ..Settings::default()
+    };
+    let identity = Identity {
+        network: 1,
+        index: 2,
+    };
+    let mut node = Node::new(&base(), identity, &settings, 1, Instant::ZERO);
+    node.begin(identity, 1, Instant::ZERO);
+    node.wait_as_spare(Instant::ZERO);
+    let call = hello(&node, node.layers.update.latest());
+    // Every second, from this time on, for this time. The drone never hovers.
+    let mut joins_after = |from_s: u64, most_s: u64| {
+        (0..most_s).find(|after_s| {
+            let now = NOW + Duration::from_millis(1_000 * (from_s + after_s));
+            node.handle_timeout(now);
+            node.handle_message(now, Side::Upstream, 1, &call);
+            node.departure(now) == crate::Departure::Member
+        })
+    };
+    assert_eq!(joins_after(0, 10), None);
+    assert_eq!(joins_after(60, 100), Some(15));
+}
+
 /// Checks that the refusal of a ground station is reported at any distance from which its frames are accepted.
 ///
 /// It is reported once a minute, and again after a frame with a new epoch.
@@ -543,4 +573,34 @@ fn a_station_with_an_old_epoch_is_reported_at_any_distance() {
         }
         assert_eq!(node.refusals(NOW), [0; 2]);
     }
+}
+
+/// Checks that a relay calls a spare only with a lease, and not while it searches for its neighbour.
+///
+/// A neighbour that restarts as a spare is called in any case.
+#[cfg(feature = "departures")]
+#[test]
+fn a_relay_with_a_lease_and_neighbours_calls_a_spare() {
+    let mut node = relay_of(Mission::try_new(paper(5)).unwrap(), 3, false);
+    let calls = |node: &Node| node.calls_to_join(Side::Downstream, 4);
+    assert!(!calls(&node));
+    node.layers.lease.set_until(NOW);
+    assert!(calls(&node));
+    node.layers.lease.set_orders(Orders {
+        joiner: 4,
+        ..Orders::NONE
+    });
+    for ends in [false, true] {
+        node.layers
+            .neighbours
+            .at_mut(Side::Downstream)
+            .give_up(NOW, ends);
+        assert_eq!(calls(&node), ends);
+    }
+    node.layers.lease.end();
+    node.layers.lease.set_orders(Orders {
+        joiner: 4,
+        ..Orders::NONE
+    });
+    assert!(!calls(&node));
 }
