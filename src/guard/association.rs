@@ -135,17 +135,6 @@ impl Association {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
 
-    /// Returns the reason why the neighbour at `side`, without an association, stops this relay.
-    ///
-    /// It is `Lost` if the neighbour is not linked because of a lost drone in `keep_out`, otherwise `Unheard`.
-    pub(super) fn unpaired_reason(&self, side: Side, keep_out: &KeepOut, own: &Own) -> HoldReason {
-        if keep_out.bars(side, self.node, self.recent_x_m(), &own.config) {
-            HoldReason::Lost
-        } else {
-            HoldReason::Unheard
-        }
-    }
-
     /// Returns the x of the neighbour's last message with its x, m; NaN without such a message.
     pub(super) const fn last_x_m(&self) -> f32 {
         self.seen_m
