@@ -725,10 +725,9 @@ impl Relay {
     #[cfg(feature = "telemetry")]
     #[doc(hidden)]
     pub fn report_control(&mut self, state: crate::flight::autopilot::state::State, refuses: bool) {
-        use crate::telemetry::REFUSED;
         let is_refused = state.is_flown() && refuses;
         let control = if is_refused {
-            REFUSED
+            crate::wire::message::Entry::REFUSED
         } else {
             state as u16 + 1
         };

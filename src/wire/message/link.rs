@@ -67,6 +67,21 @@ impl Hello {
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
+    /// Returns true if the sender is outside of the chain. It would then join when it is called, if it is `ready`.
+    pub(crate) const fn is_of_outsider(&self) -> bool {
+        self.outside && self.fresh
+    }
+
+    /// Returns true if the sender calls the destination, which is outside of the chain, to join it.
+    pub(crate) const fn calls_destination(&self) -> bool {
+        self.ready && !self.fresh
+    }
+
+    /// Returns true if the destination, which is outside of the chain, may fly away.
+    pub(crate) const fn frees_destination(&self) -> bool {
+        self.outside && !self.fresh
+    }
+
     /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The eight flags share one
     /// byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
