@@ -27,8 +27,8 @@ pub(super) struct FenceLink<R> {
     pub(super) fence_m: f32,
     /// Distance along x that the owner requests to keep from its fence, m. Infinite before its first request.
     pub(super) requested_m: f32,
-    /// Distance along x to the neighbour that the follower has agreed to, m. Infinity, also the initial value, stands for
-    /// the minimum separation. At the owner it is also a larger distance that the owner has requested afterwards.
+    /// Distance along x to the neighbour that the follower has agreed to, m. Infinity, also the initial value, stands
+    /// for the minimum separation. At the owner it is also a larger distance that it has requested since.
     pub(super) agreed_m: f32,
     /// x that the chain has agreed on for the neighbour, m.
     pub(super) target_m: f32,
@@ -75,10 +75,8 @@ impl<R: Role> FenceLink<R> {
         };
     }
 
-    /// Handles the parts of a message that concern no fence. Returns false if it belongs to an association that this relay
-    /// or the neighbour has left.
-    ///
-    /// `is_placed` is true if the message shows that its sender has a valid position, `has_x` if it has the sender's x.
+    /// Handles the parts of a message that concern no fence. Returns false if it belongs to an association that this
+    /// relay or the neighbour has left. `is_placed` is true if its position counts, `has_x` if it has the sender's x.
     pub(super) fn receive(&mut self, fence: &Fence, is_placed: bool, has_x: bool) -> bool {
         self.association.receive_halt(fence, is_placed);
         self.keep_out.record_x(&self.association, fence);
@@ -92,7 +90,7 @@ impl<R: Role> FenceLink<R> {
         true
     }
 
-    /// Returns true unless the neighbour, or a lost relay, may be closer than the separation since its start or loss.
+    /// Returns true unless the neighbour or a lost relay may be closer than the separation.
     pub(super) const fn may_change_cross_section(&self) -> bool {
         (self.association.has_no_flown_neighbour() || self.passed_first_fence)
             && !self.keep_out.is_near()

@@ -580,8 +580,8 @@ impl Reporting {
         Entry::new(relay, age, own.state + 4096 * self.control, at)
     }
 
-    /// Adds the stored entries that fit to a report toward `side`, the most urgent first. Returns true if one that was not
-    /// sent yet is left.
+    /// Adds the stored entries that fit to a report toward `side`, the most urgent first. Returns true if one that was
+    /// not sent yet is left.
     fn add_stored(
         &mut self,
         now: Instant,
@@ -622,8 +622,8 @@ impl Reporting {
         is_left
     }
 
-    /// Schedules the next report toward `side` after `report`, by the [rate](Self::rate) `(period, byte)`. `is_due` is true
-    /// if the report has this relay's entry, `is_left` if stored entries did not fit.
+    /// Schedules the next report toward `side` after `report`, by its [`rate`](Self::rate). `is_due` is true if the
+    /// report has this relay's entry, `is_left` if stored entries did not fit.
     fn schedule_next(
         &mut self,
         now: Instant,

@@ -479,7 +479,7 @@ fn one_spare_joins_for_one_departure() {
     assert_eq!(sizes, [7, 8, 7]);
 }
 
-/// Checks that one of two spares in one gap joins for one departure, although the same relays receive both in turn.
+/// Checks that one of two spares in one gap joins for one departure. The same relays receive both in turn.
 #[test]
 fn one_of_two_spares_in_a_gap_is_called() {
     for (spares, leaver) in [([5, 6], 2), ([5, 6], 4), ([1, 2], 5), ([8, 9], 4)] {
@@ -498,8 +498,8 @@ fn one_of_two_spares_in_a_gap_is_called() {
 
 /// Checks that a called spare takes no relay that searches for its neighbour for the end of the chain.
 ///
-/// Relay 6 dies while the spare 5 receives no call. The call arrives at various times of the search of relay 4. The next
-/// view has all seven relays that are left, not only those up to the spare.
+/// Relay 6 dies while the spare 5 receives no call. The call arrives at various times of the search of relay 4. The
+/// next view has all seven relays that are left, not only those up to the spare.
 #[test]
 fn a_relay_that_searches_calls_no_spare() {
     for tenths in 120..260 {

@@ -522,8 +522,8 @@ impl Node {
         }
     }
 
-    /// Asks the nodes beyond the neighbour `leaver` at `side`, which is ordered to leave, for hellos. If the chain ends with
-    /// that neighbour, gives it up.
+    /// Asks the nodes beyond `leaver`, the neighbour at `side` that is ordered to leave, for hellos. If the chain ends
+    /// with that neighbour, gives it up.
     fn pass_leaver(&mut self, now: Instant, side: Side, leaver: u16) {
         let Member { index, mission, .. } = &self.member;
         let is_end = match side {
@@ -562,7 +562,7 @@ impl Node {
         }
     }
 
-    /// Handles a hello to this relay, which is outside of the chain: permission to fly away, or call to join.
+    /// Handles a hello to this relay outside of the chain: permission to fly away, or call to join.
     fn on_hello_outside(&mut self, now: Instant, side: Side, hello: &Hello) {
         let (own, settings) = (self.member.node, self.member.settings);
         let neighbour = self.layers.neighbours.at_mut(side);

@@ -113,8 +113,8 @@ impl Hearing {
 /// Nodes on one side of the relay that recently used a wrong mission, an old epoch or a wrong key.
 ///
 /// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with an old epoch, bits 8 to 11 for nodes
-/// with a wrong key; the nearest node is first. Bits 12 to 14 stand for a ground station farther away, in the same order
-/// of the reasons. A bit remains set for one to two minutes.
+/// with a wrong key; the nearest node is first. Bits 12 to 14 stand for a ground station farther away, in the same
+/// order of the reasons. A bit remains set for one to two minutes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Refusals(RecentBits);
 
@@ -139,7 +139,7 @@ impl Refusals {
             .clear(Self::bit(1, distance) | Self::bit(2, distance));
     }
 
-    /// Returns the bit of the node `distance` relays away for the reason `reason`: 0 mission, 1 epoch, 2 key.
+    /// Returns the bit of the node `distance` relays away, for a reason: 0 mission, 1 epoch, 2 key.
     const fn bit(reason: u16, distance: u16) -> u16 {
         match mask(distance) {
             0 => 0x1000 << reason,
