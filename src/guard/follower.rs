@@ -20,7 +20,6 @@ pub(super) struct Follower {
 }
 
 impl Role for Follower {
-    const SIDE: Side = Side::Upstream;
     const FIRST_FENCE_M: f32 = f32::NEG_INFINITY;
     const NEW: Self = Self {
         owner_informed: false,
@@ -96,7 +95,12 @@ impl FenceFollower {
             [Fence::LEFT, Fence::UNPLACED].map(|flag| fence.has_flag(flag));
         // In a message with a fence number the x is that of the fence, which may be far from the neighbour.
         let has_fence = !has_left && fence.number != 0;
-        if !self.receive(fence, has_fence, is_unplaced || !has_left && !has_fence) {
+        if !self.association.receive(
+            &mut self.keep_out,
+            fence,
+            has_fence,
+            is_unplaced || !has_left && !has_fence,
+        ) {
             if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
@@ -278,7 +282,9 @@ impl FenceFollower {
     }
 
     pub(super) fn hold_reason(&self, own: &Own) -> Option<HoldReason> {
-        let obstacle = self.obstacle(own);
+        let obstacle = self
+            .keep_out
+            .obstacle(Side::Upstream, self.association.node, own);
         if obstacle.is_some() || self.association.has_no_flown_neighbour() {
             return obstacle;
         }
@@ -286,7 +292,10 @@ impl FenceFollower {
             return Some(HoldReason::Order);
         }
         if !self.has_fence() {
-            return Some(self.unpaired_reason(own));
+            return Some(
+                self.association
+                    .unpaired_reason(Side::Upstream, &self.keep_out, own),
+            );
         }
         let step_m = own.target_m() - self.target_m + own.config.rounding();
         (step_m < self.agreed_m.min(own.config.separation_m)).then_some(HoldReason::Close)

@@ -1,15 +1,11 @@
 //! Fence between this relay and the neighbour on one side: what does not depend on which of the two sets it.
 
-use super::association::{Association, Fence, HoldReason, KeepOut};
-use super::own::Own;
+use super::association::{Association, KeepOut};
 use crate::place::CrossSection;
-use crate::side::Side;
 use crate::time::Jitter;
 
 /// Part of this relay at a fence: its owner, which sets it, or its follower.
 pub(super) trait Role {
-    /// Side of this relay on which the fence is.
-    const SIDE: Side;
     /// x of the fence before the first one, m: no limit.
     const FIRST_FENCE_M: f32;
     /// State at the start of an association.
@@ -75,52 +71,9 @@ impl<R: Role> FenceLink<R> {
         };
     }
 
-    /// Handles the parts of a message that concern no fence. Returns false if it belongs to an association that this
-    /// relay or the neighbour has left. `is_placed` is true if its position counts, `has_x` if it has the sender's x.
-    pub(super) fn receive(&mut self, fence: &Fence, is_placed: bool, has_x: bool) -> bool {
-        self.association.receive_halt(fence, is_placed);
-        self.keep_out.record_x(&self.association, fence);
-        if has_x {
-            self.association.record_x(fence.x_m);
-        }
-        if self.association.is_of_left_association(fence) || fence.has_flag(Fence::LEFT) {
-            return false;
-        }
-        self.keep_out.remove_unflown();
-        true
-    }
-
     /// Returns true unless the neighbour or a lost relay may be closer than the separation.
     pub(super) const fn may_change_cross_section(&self) -> bool {
         (self.association.has_no_flown_neighbour() || self.passed_first_fence)
             && !self.keep_out.is_near()
-    }
-
-    /// Returns the reason why an obstacle on this side stops this relay; `None` if none does.
-    pub(super) fn obstacle(&self, own: &Own) -> Option<HoldReason> {
-        if self.keep_out.is_disordered() {
-            return Some(HoldReason::Order);
-        }
-        let (target_m, limit_m) = (own.target_m(), self.keep_out.limit_m());
-        let is_limited = match R::SIDE {
-            Side::Upstream => target_m < limit_m,
-            Side::Downstream => target_m > limit_m,
-        };
-        let stays = self.keep_out.is_near() && !own.has_agreed_cross_section();
-        let is_stopped = stays || is_limited || self.keep_out.blocks(own);
-        let node = self.association.node;
-        is_stopped.then(|| self.keep_out.reason(node, HoldReason::Lost))
-    }
-
-    /// Returns the reason why the neighbour, without an association, stops this relay.
-    ///
-    /// It is `Lost` if the neighbour is not linked because of a lost drone, otherwise `Unheard`.
-    pub(super) fn unpaired_reason(&self, own: &Own) -> HoldReason {
-        let (node, x_m) = (self.association.node, self.association.recent_x_m());
-        if self.keep_out.bars(R::SIDE, node, x_m, &own.config) {
-            HoldReason::Lost
-        } else {
-            HoldReason::Unheard
-        }
     }
 }

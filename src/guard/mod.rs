@@ -15,7 +15,7 @@
 //! | [`config`] | geofence of setpoints, and other settings |
 //! | `own` | the relay's setpoint and cross-section, and the interval along x in which it may be |
 //! | `association` | the session with a neighbour to which a message belongs, and requests that relays forward |
-//! | `link` | a fence, with the association and the obstacles on its side |
+//! | `link` | state that both fences have, with the association and the obstacles on that side |
 //! | `owner` | the fence downstream, which this relay sets |
 //! | `follower` | the fence upstream, which the neighbour sets |
 //!

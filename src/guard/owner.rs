@@ -24,7 +24,6 @@ pub(super) struct Owner {
 }
 
 impl Role for Owner {
-    const SIDE: Side = Side::Downstream;
     const FIRST_FENCE_M: f32 = f32::INFINITY;
     const NEW: Self = Self {
         follower_low_m: f32::NEG_INFINITY,
@@ -187,7 +186,12 @@ impl FenceOwner {
     pub(super) fn handle_fence(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
         let [has_left, is_unplaced] =
             [Fence::LEFT, Fence::UNPLACED].map(|flag| fence.has_flag(flag));
-        if !self.receive(fence, !has_left && !is_unplaced, !has_left || is_unplaced) {
+        if !self.association.receive(
+            &mut self.keep_out,
+            fence,
+            !has_left && !is_unplaced,
+            !has_left || is_unplaced,
+        ) {
             if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
@@ -393,12 +397,17 @@ impl FenceOwner {
     }
 
     pub(super) fn hold_reason(&self, own: &Own, kept_m: f32) -> Option<HoldReason> {
-        let obstacle = self.obstacle(own);
+        let obstacle = self
+            .keep_out
+            .obstacle(Side::Downstream, self.association.node, own);
         if obstacle.is_some() || self.association.has_no_flown_neighbour() {
             return obstacle;
         }
         if !self.has_reply() {
-            return Some(self.unpaired_reason(own));
+            return Some(
+                self.association
+                    .unpaired_reason(Side::Downstream, &self.keep_out, own),
+            );
         }
         if !self.is_beyond(own) {
             return Some(HoldReason::Order);
