@@ -1,4 +1,4 @@
-//! Fence between this relay and the neighbour on one side: what does not depend on which of the two sets it.
+//! Fence to the neighbour on one side: the state that its owner and its follower have in common.
 
 use super::association::{Association, KeepOut};
 use crate::place::CrossSection;

@@ -551,7 +551,7 @@ fn the_limit_of_a_second_call_starts_anew() {
     assert_eq!(joins_after(60, 100), Some(15));
 }
 
-/// Checks that the refusal of a ground station is reported at any distance that its frames are accepted from.
+/// Checks that the refusal of a ground station at any accepted distance is reported.
 ///
 /// It is reported once a minute, and again after a frame with a new epoch.
 #[test]

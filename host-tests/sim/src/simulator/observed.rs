@@ -1,4 +1,4 @@
-//! States of the relays as a run's statistics see them, and the groups of relays that fly by one agreement.
+//! States of the relays for a run's statistics, and groups of relays that fly by one agreement.
 
 use std::collections::BTreeMap;
 
