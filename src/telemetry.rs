@@ -70,7 +70,7 @@ const PHASES: [Phase; 8] = [
     Phase::NoQuorum,
 ];
 
-/// Control states in the order of their numbers in a report, from 1. The last one is [`REFUSED`].
+/// Control states in the order of their numbers in a report, from 1. The last one is [`Entry::REFUSED`].
 const CONTROLS: [State; 6] = [
     State::Silent,
     State::Grounded,
@@ -80,9 +80,11 @@ const CONTROLS: [State; 6] = [
     State::Engaged,
 ];
 
-/// Number of the control state in which the autopilot does not fly to the setpoint. The relay controls the drone, but
-/// the autopilot refuses the setpoint.
-pub(crate) const REFUSED: u16 = 6;
+const _: () = assert!(
+    State::Silent as u16 + 1 == Entry::SILENT
+        && State::Engaged as u16 + 1 == Entry::ENGAGED
+        && State::Blind as u16 + 1 == Entry::BLIND
+);
 
 /// Hold reasons in the order of their numbers in a report, from 1.
 const HOLDS: [HoldReason; 7] = [
@@ -155,7 +157,7 @@ impl Report {
             neighbours: [None; 2],
             silent: [512, 1024].map(|unit| state / unit % 2 == 1),
             is_duplicated: control >= 7,
-            refuses_setpoint: control % 7 == REFUSED,
+            refuses_setpoint: control % 7 == Entry::REFUSED,
             other_mission: refused(entry, 1),
             other_key: refused(entry, 1 + 2 * CANDIDATES),
             old_epoch: refused(entry, 1 + 4 * CANDIDATES),

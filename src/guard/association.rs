@@ -135,6 +135,28 @@ impl Association {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
 
+    /// Handles the parts of a message that concern no fence. Returns false if it belongs to an association that this
+    /// relay or the neighbour has left. `is_placed` is true if its position counts, `has_x` if it has the sender's x.
+    #[inline(never)] // called from both sides
+    pub(super) fn receive(
+        &mut self,
+        keep_out: &mut KeepOut,
+        fence: &Fence,
+        is_placed: bool,
+        has_x: bool,
+    ) -> bool {
+        self.receive_halt(fence, is_placed);
+        keep_out.record_x(self, fence);
+        if has_x {
+            self.record_x(fence.x_m);
+        }
+        if self.is_of_left_association(fence) || fence.has_flag(Fence::LEFT) {
+            return false;
+        }
+        keep_out.remove_unflown();
+        true
+    }
+
     /// Returns the reason why the neighbour at `side`, without an association, stops this relay.
     ///
     /// It is `Lost` if the neighbour is not linked because of a lost drone in `keep_out`, otherwise `Unheard`.
@@ -479,6 +501,21 @@ impl KeepOut {
         } else {
             otherwise
         }
+    }
+
+    /// Returns the reason why an obstacle at `side`, where `node` is the neighbour, stops this relay.
+    #[inline(never)] // called from both sides
+    pub(super) fn obstacle(&self, side: Side, node: u16, own: &Own) -> Option<HoldReason> {
+        if self.is_disordered() {
+            return Some(HoldReason::Order);
+        }
+        let is_limited = match side {
+            Side::Upstream => own.target_m() < self.limit_m,
+            Side::Downstream => own.target_m() > self.limit_m,
+        };
+        let stays = self.is_near() && !own.has_agreed_cross_section();
+        let is_stopped = stays || is_limited || self.blocks(own);
+        is_stopped.then(|| self.reason(node, HoldReason::Lost))
     }
 
     /// Returns true if a drone not flying to setpoints blocks this relay's way to its agreed position. The way begins

@@ -1,56 +1,32 @@
 //! Fence on the upstream side of this relay, set by the upstream neighbour.
 
-use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
+use super::link::{FenceLink, Role};
 use super::own::Own;
-use crate::place::{CrossSection, Placement};
+use crate::place::Placement;
 use crate::serial_number::is_newer;
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Tx: the plane x = constant that is a lower limit of this relay's x. The upstream neighbour
-/// sets it.
+/// Fence toward Tx: the plane x = constant that is a lower limit of this relay's x. The upstream neighbour sets it.
+pub(super) type FenceFollower = FenceLink<Follower>;
+
+/// State of the fence toward Tx that only this relay, its follower, has.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FenceFollower {
-    pub(super) association: Association,
-    pub(super) keep_out: KeepOut,
-    /// Sequence number of the newest fence from the upstream neighbour; 0 for none yet.
-    number: u16,
-    /// Newest lower limit of this relay's x (fence), which the upstream neighbour has set, m.
-    fence_m: f32,
-    /// Distance along x that the upstream neighbour requests to keep from its fence, m. Infinite before
-    /// its first request.
-    requested_m: f32,
-    /// Distance along x to the upstream neighbour that this relay has agreed to, m. Infinity, also the initial value,
-    /// stands for the minimum separation.
-    agreed_m: f32,
-    /// x that the chain has agreed on for the upstream neighbour, m.
-    target_m: f32,
-    /// Lateral offset and altitude of the upstream neighbour's setpoint.
-    across: CrossSection,
-    /// True once this relay's x is known to have reached a fence (lower limit) of the upstream neighbour.
-    passed_first_fence: bool,
+pub(super) struct Follower {
     /// True once the upstream neighbour has been told that this relay has reached the newest fence. The fence is the
     /// lower limit of this relay's x.
     owner_informed: bool,
 }
 
-impl FenceFollower {
-    pub(super) const fn new(node: u16, jitter: &mut Jitter) -> Self {
-        Self {
-            association: Association::new(node, jitter),
-            keep_out: KeepOut::none(),
-            number: 0,
-            fence_m: f32::NEG_INFINITY,
-            requested_m: f32::INFINITY,
-            agreed_m: f32::INFINITY,
-            target_m: 0.0,
-            across: CrossSection::on_line(0.0),
-            passed_first_fence: false,
-            owner_informed: false,
-        }
-    }
+impl Role for Follower {
+    const FIRST_FENCE_M: f32 = f32::NEG_INFINITY;
+    const NEW: Self = Self {
+        owner_informed: false,
+    };
+}
 
+impl FenceFollower {
     /// Replaces the upstream neighbour by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
@@ -100,26 +76,6 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association, and schedules a notice of this to the upstream neighbour. This relay's drone
-    /// no longer flies to setpoints, so no limit of x applies to this relay.
-    pub(super) fn leave(&mut self, jitter: &mut Jitter) {
-        *self = Self {
-            keep_out: self.keep_out,
-            association: self.association.leave(jitter),
-            ..Self::new(self.association.node, jitter)
-        };
-    }
-
-    /// Starts a new association, because Tx or Rx has moved. Lost relays on this side remain obstacles.
-    /// Drones that do not fly to setpoints are no longer obstacles.
-    pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
-        *self = Self {
-            keep_out: self.keep_out.leave_line(),
-            association: self.association.renew(jitter),
-            ..Self::new(self.association.node, jitter)
-        };
-    }
-
     /// Handles the notice that the upstream neighbour no longer flies to setpoints. This relay comes no nearer to that
     /// neighbour. If the two were in the wrong order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
@@ -135,14 +91,16 @@ impl FenceFollower {
     }
 
     pub(super) fn handle_fence(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
-        let is_placed = !fence.has_flag(Fence::LEFT) && fence.number != 0;
-        self.association.receive_halt(fence, is_placed);
-        self.keep_out.record_x(&self.association, fence);
+        let [has_left, is_unplaced] =
+            [Fence::LEFT, Fence::UNPLACED].map(|flag| fence.has_flag(flag));
         // In a message with a fence number the x is that of the fence, which may be far from the neighbour.
-        if fence.has_flag(Fence::UNPLACED) || !fence.has_flag(Fence::LEFT) && fence.number == 0 {
-            self.association.record_x(fence.x_m);
-        }
-        if self.association.is_of_left_association(fence) || fence.has_flag(Fence::LEFT) {
+        let has_fence = !has_left && fence.number != 0;
+        if !self.association.receive(
+            &mut self.keep_out,
+            fence,
+            has_fence,
+            is_unplaced || !has_left && !has_fence,
+        ) {
             if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
@@ -150,7 +108,6 @@ impl FenceFollower {
             self.association.due |= !fence.has_flag(Fence::UNPLACED);
             return;
         }
-        self.keep_out.remove_unflown();
         let is_first = self.association.peer_number == 0;
         // A fence with a number does not have its sender's x, and is of an association that this relay has left.
         if fence.association != self.association.peer_number
@@ -188,7 +145,7 @@ impl FenceFollower {
             self.number = fence.number;
             self.fence_m = fence.x_m;
             self.requested_m = fence.apart_m;
-            self.owner_informed = false;
+            self.role.owner_informed = false;
         }
     }
 
@@ -213,9 +170,7 @@ impl FenceFollower {
     /// Returns true if the upstream neighbour permits this relay to change its lateral offset and altitude. A lost
     /// relay that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
-        (self.association.has_no_flown_neighbour() || self.passed_first_fence)
-            && !self.has_reduced_step(own)
-            && !self.keep_out.is_near()
+        self.may_change_cross_section() && !self.has_reduced_step(own)
     }
 
     /// Returns true if the upstream neighbour requests to come closer along x than the minimum separation. Meanwhile
@@ -289,7 +244,7 @@ impl FenceFollower {
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
             self.passed_first_fence |= own.reachable.low_m >= self.fence_m;
-            self.association.due |= low_m >= self.fence_m && !self.owner_informed;
+            self.association.due |= low_m >= self.fence_m && !self.role.owner_informed;
         }
     }
 
@@ -314,7 +269,7 @@ impl FenceFollower {
             return None;
         }
         self.association.due = false;
-        self.owner_informed = low_m >= self.fence_m;
+        self.role.owner_informed = low_m >= self.fence_m;
         let mut fence = self.association.fence(own);
         (fence.number, fence.x_m) = (self.number, low_m);
         if !placed {
@@ -327,20 +282,11 @@ impl FenceFollower {
     }
 
     pub(super) fn hold_reason(&self, own: &Own) -> Option<HoldReason> {
-        if self.keep_out.is_disordered() {
-            return Some(HoldReason::Order);
-        }
-        let target_m = own.target_m();
-        let stays = self.keep_out.is_near() && !own.has_agreed_cross_section();
-        let bars = self.keep_out.blocks(own);
-        if stays || bars || target_m < self.keep_out.limit_m() {
-            return Some(
-                self.keep_out
-                    .reason(self.association.node, HoldReason::Lost),
-            );
-        }
-        if self.association.has_no_flown_neighbour() {
-            return None;
+        let obstacle = self
+            .keep_out
+            .obstacle(Side::Upstream, self.association.node, own);
+        if obstacle.is_some() || self.association.has_no_flown_neighbour() {
+            return obstacle;
         }
         if self.is_out_of_order(own) {
             return Some(HoldReason::Order);
@@ -351,7 +297,7 @@ impl FenceFollower {
                     .unpaired_reason(Side::Upstream, &self.keep_out, own),
             );
         }
-        let step_m = target_m - self.target_m + own.config.rounding();
+        let step_m = own.target_m() - self.target_m + own.config.rounding();
         (step_m < self.agreed_m.min(own.config.separation_m)).then_some(HoldReason::Close)
     }
 }

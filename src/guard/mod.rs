@@ -15,6 +15,7 @@
 //! | [`config`] | geofence of setpoints, and other settings |
 //! | `own` | the relay's setpoint and cross-section, and the interval along x in which it may be |
 //! | `association` | the session with a neighbour to which a message belongs, and requests that relays forward |
+//! | `link` | state that both fences have, with the association and the obstacles on that side |
 //! | `owner` | the fence downstream, which this relay sets |
 //! | `follower` | the fence upstream, which the neighbour sets |
 //!
@@ -91,6 +92,7 @@
 mod association;
 pub mod config;
 mod follower;
+mod link;
 mod own;
 mod owner;
 #[cfg(test)]
@@ -102,7 +104,7 @@ use crate::stats::bump;
 use crate::time::{Instant, Jitter};
 
 pub use self::association::{Fence, HoldReason};
-use association::Association;
+use association::{Association, KeepOut};
 use config::{Geofence, GuardConfig, is_coordinate};
 use follower::FenceFollower;
 use own::{Own, ReachableInterval};
@@ -564,22 +566,15 @@ impl Guard {
     /// refer to the previous positions. While the drone does not fly to setpoints, only [`HoldReason::Order`] is
     /// possible: the drone is on the wrong side of a neighbour that flies to setpoints.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
-        let own = &self.own;
+        let (own, (association, _)) = (&self.own, self.at(side));
         if !self.flown {
-            let wrong = match side {
-                Side::Upstream => self.follower.association.is_on_wrong_side(own, side),
-                Side::Downstream => self.owner.association.is_on_wrong_side(own, side),
-            };
+            let wrong = association.is_on_wrong_side(own, side);
             return wrong.then_some(HoldReason::Order);
         }
         own.goal?;
         let reason = match side {
             Side::Upstream => self.follower.hold_reason(own),
             Side::Downstream => self.owner.hold_reason(own, self.follower.kept_distance()),
-        };
-        let association = match side {
-            Side::Upstream => &self.follower.association,
-            Side::Downstream => &self.owner.association,
         };
         let halted = association.has_halt_request();
         reason
@@ -589,11 +584,16 @@ impl Guard {
 
     /// Returns true if a lost relay toward `side` may still hover: no operator has reported it as gone.
     pub fn has_lost(&self, side: Side) -> bool {
-        let keep_out = match side {
-            Side::Upstream => &self.follower.keep_out,
-            Side::Downstream => &self.owner.keep_out,
-        };
+        let (_, keep_out) = self.at(side);
         keep_out.has_lost()
+    }
+
+    /// Returns the association and the obstacles at `side`.
+    const fn at(&self, side: Side) -> (&Association, &KeepOut) {
+        match side {
+            Side::Upstream => (&self.follower.association, &self.follower.keep_out),
+            Side::Downstream => (&self.owner.association, &self.owner.keep_out),
+        }
     }
 
     /// Returns the agreed position of the neighbour at `side`; `None` while it is unknown.
@@ -607,18 +607,10 @@ impl Guard {
     /// Returns a reason if the setpoint should have moved toward `side`, but has not for five seconds. The reason is
     /// `NotFlown` if the neighbour does not fly to setpoints, otherwise `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
-        let own = &self.own;
-        let (may_cross, keep_out, association) = match side {
-            Side::Upstream => (
-                self.follower.may_move_across(own),
-                &self.follower.keep_out,
-                &self.follower.association,
-            ),
-            Side::Downstream => (
-                self.owner.may_move_across(own),
-                &self.owner.keep_out,
-                &self.owner.association,
-            ),
+        let (own, (association, keep_out)) = (&self.own, self.at(side));
+        let may_cross = match side {
+            Side::Upstream => self.follower.may_move_across(own),
+            Side::Downstream => self.owner.may_move_across(own),
         };
         let is_held_up = own.is_held_up(side, may_cross);
         is_held_up.then(|| keep_out.reason(association.node, HoldReason::Pending))

@@ -1,63 +1,38 @@
 //! Fence on the downstream side of this relay, set by this relay.
 
-use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
+use super::link::{FenceLink, Role};
 use super::own::Own;
 use crate::features::DEPARTURES;
-use crate::place::{CrossSection, Placement};
+use crate::place::Placement;
 use crate::serial_number::next_nonzero;
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Rx: a plane x = constant, the downstream neighbour's lower limit of x. This relay sets the
-/// fence.
+/// Fence toward Rx: a plane x = constant, the downstream neighbour's lower limit of x. This relay sets the fence.
+pub(super) type FenceOwner = FenceLink<Owner>;
+
+/// State of the fence toward Rx that only this relay, its owner, has.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FenceOwner {
-    pub(super) association: Association,
-    pub(super) keep_out: KeepOut,
-    /// Sequence number of the newest fence sent to the downstream neighbour; 0 for none.
-    number: u16,
-    /// Newest lower limit of the downstream neighbour's x (fence), which this relay has set, m. Infinite before the
-    /// first.
-    fence_m: f32,
-    /// Distance along x that this relay requests to keep from its fence, m. Infinite before its first
-    /// request.
-    requested_m: f32,
-    /// Distance along x to keep now to the downstream neighbour, m. Infinity stands for the minimum separation. The
-    /// value is the agreed distance, or a larger distance that this relay has requested after the agreement.
-    agreed_m: f32,
+pub(super) struct Owner {
     /// Lowest x at which the downstream neighbour can be, m. Negative infinity before its first message.
     follower_low_m: f32,
-    /// x that the chain has agreed on for the downstream neighbour, m.
-    target_m: f32,
-    /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour is
-    /// there.
-    across: CrossSection,
+    /// True once the downstream neighbour is at the lateral offset and altitude of its setpoint.
     arrived: bool,
     /// True if the downstream neighbour has received the newest fence, the lower limit of its x.
     is_acknowledged: bool,
-    /// True once the downstream neighbour has reported that it has reached a fence (lower limit of its x).
-    passed_first_fence: bool,
+}
+
+impl Role for Owner {
+    const FIRST_FENCE_M: f32 = f32::INFINITY;
+    const NEW: Self = Self {
+        follower_low_m: f32::NEG_INFINITY,
+        arrived: false,
+        is_acknowledged: false,
+    };
 }
 
 impl FenceOwner {
-    pub(super) const fn new(node: u16, jitter: &mut Jitter) -> Self {
-        Self {
-            association: Association::new(node, jitter),
-            keep_out: KeepOut::none(),
-            number: 0,
-            fence_m: f32::INFINITY,
-            requested_m: f32::INFINITY,
-            agreed_m: f32::INFINITY,
-            follower_low_m: f32::NEG_INFINITY,
-            target_m: 0.0,
-            across: CrossSection::on_line(0.0),
-            arrived: false,
-            is_acknowledged: false,
-            passed_first_fence: false,
-        }
-    }
-
     /// Replaces the downstream neighbour by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
@@ -73,9 +48,9 @@ impl FenceOwner {
     /// Records the x of the downstream neighbour, which is lost or has restarted. It is its last known x, or on its way
     /// to its agreed position, but not before the last fence that it has passed.
     fn record_lost_x(&mut self) {
-        if !self.association.has_no_flown_neighbour() && self.follower_low_m.is_finite() {
+        if !self.association.has_no_flown_neighbour() && self.role.follower_low_m.is_finite() {
             let last_m = self.association.last_x_m().min(self.target_m);
-            let (node, x_m) = (self.association.node, last_m.max(self.follower_low_m));
+            let (node, x_m) = (self.association.node, last_m.max(self.role.follower_low_m));
             self.keep_out.record_lost_x(Side::Downstream, node, x_m);
         }
     }
@@ -96,26 +71,6 @@ impl FenceOwner {
         }
         *self = Self {
             keep_out,
-            ..Self::new(self.association.node, jitter)
-        };
-    }
-
-    /// Leaves the association, and schedules a notice of this to the downstream neighbour. This relay's drone
-    /// no longer flies to setpoints, so no limit of x applies to this relay.
-    pub(super) fn leave(&mut self, jitter: &mut Jitter) {
-        *self = Self {
-            keep_out: self.keep_out,
-            association: self.association.leave(jitter),
-            ..Self::new(self.association.node, jitter)
-        };
-    }
-
-    /// Starts a new association, because Tx or Rx has moved. Lost relays on this side remain obstacles.
-    /// Drones that do not fly to setpoints are no longer obstacles.
-    pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
-        *self = Self {
-            keep_out: self.keep_out.leave_line(),
-            association: self.association.renew(jitter),
             ..Self::new(self.association.node, jitter)
         };
     }
@@ -154,7 +109,7 @@ impl FenceOwner {
         if self.keep_out.is_disordered() {
             true
         } else if self.has_reply() {
-            !self.is_beyond(own) && self.follower_low_m > f32::NEG_INFINITY
+            !self.is_beyond(own) && self.role.follower_low_m > f32::NEG_INFINITY
         } else {
             !self.is_ordered(own) && self.association.is_on_wrong_side(own, Side::Downstream)
         }
@@ -176,16 +131,16 @@ impl FenceOwner {
             (false, true) => -off_m - own.config.rounding(),
             (false, false) => off_m,
         };
-        self.follower_low_m - own.reachable.high_m >= least_m
+        self.role.follower_low_m - own.reachable.high_m >= least_m
     }
 
     /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream is at a smaller x than
     /// this relay only within the errors of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
-        let is_lower = self.follower_low_m < low_m - 2.0 * own.config.rounding();
+        let is_lower = self.role.follower_low_m < low_m - 2.0 * own.config.rounding();
         if !self.association.has_no_flown_neighbour() && self.has_reply() && is_lower {
-            self.follower_low_m
+            self.role.follower_low_m
         } else {
             low_m
         }
@@ -224,19 +179,21 @@ impl FenceOwner {
     /// Returns the downstream neighbour's agreed position; `None` before its first fence message. A fence message
     /// contains a limit of x and the agreed position.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
-        self.follower_low_m
+        self.role
+            .follower_low_m
             .is_finite()
             .then(|| self.across.at(self.target_m))
     }
 
     pub(super) fn handle_fence(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {
-        let is_placed = !fence.has_flag(Fence::LEFT) && !fence.has_flag(Fence::UNPLACED);
-        self.association.receive_halt(fence, is_placed);
-        self.keep_out.record_x(&self.association, fence);
-        if !fence.has_flag(Fence::LEFT) || fence.has_flag(Fence::UNPLACED) {
-            self.association.record_x(fence.x_m);
-        }
-        if self.association.is_of_left_association(fence) || fence.has_flag(Fence::LEFT) {
+        let [has_left, is_unplaced] =
+            [Fence::LEFT, Fence::UNPLACED].map(|flag| fence.has_flag(flag));
+        if !self.association.receive(
+            &mut self.keep_out,
+            fence,
+            !has_left && !is_unplaced,
+            !has_left || is_unplaced,
+        ) {
             if self.association.is_leave_notice(fence) {
                 self.release(fence.association, own, jitter);
             }
@@ -244,7 +201,6 @@ impl FenceOwner {
             self.association.due |= !fence.has_flag(Fence::UNPLACED);
             return;
         }
-        self.keep_out.remove_unflown();
         if !self.has_reply() && fence.echo == self.association.own_number {
             let node = self.association.node;
             let keep_out = &self.keep_out;
@@ -268,12 +224,12 @@ impl FenceOwner {
             return;
         }
         self.target_m = fence.target_m;
-        (self.across, self.arrived) = (fence.across, fence.has_flag(Fence::ARRIVED));
-        self.is_acknowledged = fence.number == self.number;
-        if self.is_acknowledged {
-            self.follower_low_m = self.follower_low_m.max(fence.x_m.min(self.fence_m));
+        (self.across, self.role.arrived) = (fence.across, fence.has_flag(Fence::ARRIVED));
+        self.role.is_acknowledged = fence.number == self.number;
+        if self.role.is_acknowledged {
+            self.role.follower_low_m = self.role.follower_low_m.max(fence.x_m.min(self.fence_m));
             self.passed_first_fence |= self.number != 0 && fence.x_m >= self.fence_m;
-            if self.arrived && fence.has_flag(Fence::AGREES) {
+            if self.role.arrived && fence.has_flag(Fence::AGREES) {
                 let least_m = own.config.least_step(own.cross_section(), fence.across);
                 self.agreed_m = self.agreed_m.min(self.requested_m.max(least_m));
             }
@@ -292,7 +248,7 @@ impl FenceOwner {
             self.is_beyond(own),
         ) {
             (true, _) => f32::INFINITY,
-            (false, true) => self.follower_low_m - apart,
+            (false, true) => self.role.follower_low_m - apart,
             (false, false) => own.reachable.setpoint_m,
         };
         granted.min(self.keep_out.limit_m())
@@ -301,9 +257,7 @@ impl FenceOwner {
     /// Returns true if the downstream neighbour permits this relay to change lateral offset and altitude. A lost relay
     /// that may be closer than the separation forbids it, too.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
-        (self.association.has_no_flown_neighbour() || self.passed_first_fence)
-            && !self.has_reduced_step(own)
-            && !self.keep_out.is_near()
+        self.may_change_cross_section() && !self.has_reduced_step(own)
     }
 
     /// Returns true while this relay may be as close to its downstream neighbour as it was at its start.
@@ -323,14 +277,16 @@ impl FenceOwner {
 
     /// Returns true if the downstream neighbour is known to be beyond the newest fence.
     pub(super) fn is_cleared(&self) -> bool {
-        self.passed_first_fence && self.is_acknowledged && self.follower_low_m >= self.fence_m
+        self.passed_first_fence
+            && self.role.is_acknowledged
+            && self.role.follower_low_m >= self.fence_m
     }
 
     /// Returns true unless the downstream neighbour still has to answer the newest fence. It has to answer
     /// none before its first message, and while it does not fly to setpoints.
     pub(super) fn is_answered(&self) -> bool {
         let cannot = !self.has_reply() || self.association.has_no_flown_neighbour();
-        cannot || self.is_acknowledged && !self.association.due
+        cannot || self.role.is_acknowledged && !self.association.due
     }
 
     /// Returns the smallest permitted distance along x between this relay and its downstream neighbour, m.
@@ -341,7 +297,7 @@ impl FenceOwner {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
         let settled = self.passed_first_fence
-            && self.arrived
+            && self.role.arrived
             && own.arrived
             && own.has_agreed_cross_section()
             && !own.open;
@@ -365,7 +321,7 @@ impl FenceOwner {
         }
         let best = self.best_step(own);
         // The step increases only if this relay is already that far away.
-        let now_m = self.follower_low_m - own.reachable.high_m + own.config.rounding();
+        let now_m = self.role.follower_low_m - own.reachable.high_m + own.config.rounding();
         let step_m = if best > self.agreed_m.max(now_m) {
             self.requested_m
         } else {
@@ -426,8 +382,8 @@ impl FenceOwner {
             self.fence_m = x_m;
             self.requested_m = step_m;
             self.agreed_m = self.agreed_m.max(step_m);
-            self.is_acknowledged = false;
-            self.follower_low_m = self.follower_low_m.min(x_m);
+            self.role.is_acknowledged = false;
+            self.role.follower_low_m = self.role.follower_low_m.min(x_m);
         }
         let x_m = if self.number == 0 {
             own.reachable.high_m
@@ -443,20 +399,11 @@ impl FenceOwner {
     }
 
     pub(super) fn hold_reason(&self, own: &Own, kept_m: f32) -> Option<HoldReason> {
-        if self.keep_out.is_disordered() {
-            return Some(HoldReason::Order);
-        }
-        let target_m = own.target_m();
-        let stays = self.keep_out.is_near() && !own.has_agreed_cross_section();
-        let bars = self.keep_out.blocks(own);
-        if stays || bars || target_m > self.keep_out.limit_m() {
-            return Some(
-                self.keep_out
-                    .reason(self.association.node, HoldReason::Lost),
-            );
-        }
-        if self.association.has_no_flown_neighbour() {
-            return None;
+        let obstacle = self
+            .keep_out
+            .obstacle(Side::Downstream, self.association.node, own);
+        if obstacle.is_some() || self.association.has_no_flown_neighbour() {
+            return obstacle;
         }
         if !self.has_reply() {
             return Some(
@@ -467,7 +414,7 @@ impl FenceOwner {
         if !self.is_beyond(own) {
             return Some(HoldReason::Order);
         }
-        let step_m = self.target_m - target_m;
+        let step_m = self.target_m - own.target_m();
         let far = step_m + own.config.rounding() < self.step(own, kept_m);
         far.then_some(HoldReason::Close)
     }

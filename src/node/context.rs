@@ -237,9 +237,16 @@ impl OtherLeases {
     }
 }
 
-/// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), its [refusals](crate::wire::message::Entry::refusal) toward Tx and toward Rx, the setpoint, and the agreed position.
-pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
+/// State that this relay reports about itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct OwnState {
+    /// Number of the state in an entry, without the control state.
+    pub(crate) state: u16,
+    /// [Refusals](crate::wire::message::Entry::refusal) toward Tx and toward Rx.
+    pub(crate) refusals: [u16; 2],
+    pub(crate) setpoint: Option<Placement>,
+    pub(crate) agreed: Option<Placement>,
+}
 
 /// Results of one protocol layer's step, for the other layers and the firmware.
 #[expect(

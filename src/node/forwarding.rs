@@ -9,7 +9,7 @@
     reason = "the same interface as that of `reports`"
 )]
 
-use super::context::{Member, Own};
+use super::context::{Member, OwnState};
 use super::neighbour::Neighbours;
 use crate::features::AUTH;
 use crate::place::Placement;
@@ -75,7 +75,7 @@ impl Reporting {
         member: &Member,
         neighbours: &Neighbours,
         _: Duration,
-        _: Own,
+        _: OwnState,
     ) -> Option<(Side, u16, Message)> {
         let (side, message) = self.0.first_mut()?.take()?;
         let to = neighbours.next(member, side)?;

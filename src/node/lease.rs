@@ -234,6 +234,11 @@ impl Lease {
         self.orders = orders;
     }
 
+    #[cfg(all(test, feature = "departures"))]
+    pub(crate) const fn set_until(&mut self, until: Instant) {
+        self.state = LeaseState::Until(until);
+    }
+
     /// Returns true if all relays of the view have provably received the leader's last orders.
     pub(crate) fn has_completed(&self) -> bool {
         self.current.is_some() && !self.circulation.is_outstanding()
@@ -505,7 +510,8 @@ impl Lease {
                     in_place: requests.in_place && self.is_agreed,
                     ..*requests
                 };
-                Some(received.map_or(own, |received| received.merge(own)))
+                let called = self.orders.joiner;
+                Some(received.map_or(own, |received| received.merge(own, called)))
             }
         };
         if let Some(departures) = self.departures.first_mut() {
@@ -773,6 +779,32 @@ mod tests {
         assert_eq!(called(0, &reports), [0; 5]);
         assert_eq!(called(3, &reports), [0; 5]);
         assert_eq!(called(4, &reports), [0, 5, 5, 5, 0]);
+    }
+
+    /// Checks that a called spare comes before that of a relay with a more urgent request.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn a_called_spare_comes_before_others() {
+        let settings = Settings::default();
+        let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
+        let spare_if_called = |called: u16| {
+            let mut lease = Lease::new(1, Instant::ZERO, &settings);
+            lease.current = Some(Current {
+                number: 7,
+                span: 150,
+            });
+            lease.circulation.start(Instant::ZERO);
+            lease.orders.joiner = called;
+            let with = |leaver: u16, spare: u16| Requests {
+                leaver,
+                spare,
+                ..Requests::NONE
+            };
+            lease.set_requests(with(0, 6));
+            lease.complete_renewal(&context(&member, 1), Some(with(3, 5)));
+            lease.requests.unwrap().spare
+        };
+        assert_eq!([0, 5, 6, 7].map(spare_if_called), [5, 5, 6, 5]);
     }
 
     /// Checks that relays that move after a later agreement of a view are not in place.

@@ -19,16 +19,14 @@ use core::num::NonZeroU16;
 
 use heapless::Vec;
 
-use super::context::{Member, Own};
+use super::context::{Member, OwnState};
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
-use crate::flight::autopilot::state::State;
 use crate::mission::MAX_RELAYS;
 use crate::place::Placement;
 use crate::serial_number::is_newer;
 use crate::settings::Wiring;
 use crate::side::Side;
-use crate::telemetry::REFUSED;
 use crate::time::{Duration, Instant};
 use crate::wire::STATION_REACH;
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
@@ -59,9 +57,6 @@ const DIRECT: u8 = MOST_DOUBLINGS + 1;
 /// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
 /// reports.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
-
-/// Control state of a drone that the relay controls.
-const ENGAGED: u16 = State::Engaged as u16 + 1;
 
 /// Time by which a report that begins an alarm may be sent earlier than other reports. Those wait until the telemetry's
 /// share of the data rate allows them.
@@ -274,7 +269,7 @@ impl Reporting {
         member: &Member,
         neighbours: &Neighbours,
         wait: Duration,
-        own: Own,
+        own: OwnState,
     ) -> Option<(Side, u16, Message)> {
         for side in [Side::Upstream, Side::Downstream] {
             let watched = self.at(side);
@@ -359,10 +354,8 @@ const fn earlier(at: Instant, span: Duration) -> Instant {
 /// An alarm begins if the autopilot is no longer received, has no position any more, or flies to another target, or if
 /// the relay no longer controls the drone.
 const fn begins_alarm(before: u16, now: u16) -> bool {
-    const SILENT: u16 = State::Silent as u16 + 1;
-    const BLIND: u16 = State::Blind as u16 + 1;
-    let is_fault = now == SILENT || now == BLIND || now == REFUSED;
-    let is_released = before == ENGAGED || before == REFUSED && now != ENGAGED;
+    let is_fault = now == Entry::SILENT || now == Entry::BLIND || now == Entry::REFUSED;
+    let is_released = before == Entry::ENGAGED || before == Entry::REFUSED && now != Entry::ENGAGED;
     before != now && before != 0 && (is_fault || is_released)
 }
 
@@ -533,35 +526,70 @@ impl Reporting {
         member: &Member,
         neighbours: &Neighbours,
         side: Side,
-        own: Own,
+        own: OwnState,
     ) -> Option<Reports> {
         let (period, byte) = self.rate(now, member, side);
-        let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
-        let (control, power_w) = (self.control, self.power_w);
         let reported = self.reported;
-        let watched = self.at(side);
+        let (power_w, watched) = (self.power_w, self.at(side));
         let mut report = Reports::new(watched.number, member.digest);
         // An alarm of this relay is part of a report about others, even before its turn.
         let is_due = now >= watched.own_from || watched.is_alarmed && now >= reported + STEP;
         if is_due {
-            let at = Coarse::of(position.map(|(_, place)| place));
-            // A position from before the last entry would not count as newer than that entry.
-            let state_at = position.map_or(now, |(at, _)| at);
-            let reported = state_at.max(reported + STEP).min(now);
-            let age = age(now, reported);
-            let [state, before, after] = own.0;
-            // An entry has room for one node.
-            let is_turn = after == 0 || watched.count.is_multiple_of(2);
-            self.reported = reported;
-            let refusal = if before != 0 && is_turn {
-                before
-            } else {
-                after
-            };
-            let relay = member.node + MAX_RELAYS * refusal;
-            let entry = Entry::new(relay, age, state + 4096 * control, at);
+            let entry = self.own_entry(now, member, side, own);
             _ = report.entries.push(entry);
         }
+        let is_left = self.add_stored(now, member, side, period, &mut report);
+        let watched = self.at(side);
+        if is_due && watched.count.is_multiple_of(8) && report.detail.is_none() {
+            let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
+            let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
+            let places = [own.setpoint, own.agreed].map(Coarse::of);
+            report.detail = Some(Detail::new(places, nodes, power_w, member.active.version));
+            watched.count = 1;
+        } else if is_due && !watched.count.is_multiple_of(8) {
+            watched.count += 1;
+        }
+        self.schedule_next(
+            now,
+            member,
+            side,
+            (period, byte),
+            (is_due, is_left),
+            &report,
+        );
+        (!report.entries.is_empty()).then_some(report)
+    }
+
+    /// Returns this relay's entry for a report toward `side`, and records the time of the state in it.
+    fn own_entry(&mut self, now: Instant, member: &Member, side: Side, own: OwnState) -> Entry {
+        let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
+        let at = Coarse::of(position.map(|(_, place)| place));
+        // A position from before the last entry would not count as newer than that entry.
+        let state_at = position.map_or(now, |(at, _)| at);
+        self.reported = state_at.max(self.reported + STEP).min(now);
+        let age = age(now, self.reported);
+        // An entry has room for one node.
+        let [before, after] = own.refusals;
+        let is_turn = after == 0 || self.at(side).count.is_multiple_of(2);
+        let refusal = if before != 0 && is_turn {
+            before
+        } else {
+            after
+        };
+        let relay = member.node + MAX_RELAYS * refusal;
+        Entry::new(relay, age, own.state + 4096 * self.control, at)
+    }
+
+    /// Adds the stored entries that fit to a report toward `side`, the most urgent first. Returns true if one that was
+    /// not sent yet is left.
+    fn add_stored(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        side: Side,
+        period: Duration,
+        report: &mut Reports,
+    ) -> bool {
         self.stored.retain(|stored| {
             let age = now.since(stored.at);
             age < OLDEST && (stored.rank > Rank::Sent || age < period.times(3))
@@ -590,17 +618,23 @@ impl Reporting {
                 stored.from = now + period;
             }
         }
+        self.at(side).stores_alarm = stores_alarm;
+        is_left
+    }
+
+    /// Schedules the next report toward `side` after `report`, by its [`rate`](Self::rate). `is_due` is true if the
+    /// report has this relay's entry, `is_left` if stored entries did not fit.
+    fn schedule_next(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        side: Side,
+        (period, byte): (Duration, Duration),
+        (is_due, is_left): (bool, bool),
+        report: &Reports,
+    ) {
         let changed_from = self.reported + STEP;
         let watched = self.at(side);
-        if is_due && watched.count.is_multiple_of(8) && report.detail.is_none() {
-            let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
-            let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
-            let places = own.1.map(Coarse::of);
-            report.detail = Some(Detail::new(places, nodes, power_w, member.active.version));
-            watched.count = 1;
-        } else if is_due && !watched.count.is_multiple_of(8) {
-            watched.count += 1;
-        }
         let entries = u32::try_from(report.entries.len()).unwrap_or(0);
         let detail = report.detail.map_or(0, |_| SHARE);
         let half = micros(period) / 2;
@@ -617,7 +651,6 @@ impl Reporting {
             watched.own_from = now + late.times(6).max(STEP);
             watched.is_alarmed = false;
         }
-        watched.stores_alarm = stores_alarm;
         watched.due = match (is_left, watched.is_fed) {
             (true, _) => now,
             // The reports of relays behind come first.
@@ -633,7 +666,6 @@ impl Reporting {
             watched.due = watched.due.min(watched.own_from);
         }
         watched.is_fed = false;
-        (entries > 0).then_some(report)
     }
 
     /// Returns the time from one report to the next, for each byte of the first one. With this time the reports of all

@@ -725,10 +725,9 @@ impl Relay {
     #[cfg(feature = "telemetry")]
     #[doc(hidden)]
     pub fn report_control(&mut self, state: crate::flight::autopilot::state::State, refuses: bool) {
-        use crate::telemetry::REFUSED;
         let is_refused = state.is_flown() && refuses;
         let control = if is_refused {
-            REFUSED
+            crate::wire::message::Entry::REFUSED
         } else {
             state as u16 + 1
         };
@@ -786,7 +785,8 @@ impl Relay {
     /// Call it right after the start and [`resume_view`](Self::resume_view): it has no effect once the relay has taken
     /// part in a pass (message along the chain) or in a view change (vote on the members). A relay with two wires
     /// cannot be a spare. No guard (collision avoidance) knows the position of a waiting spare: the spare must stay at
-    /// least the minimum separation away from all positions of the chain. Takes constant time.
+    /// least the minimum separation away from all positions of the chain. A relay that restarts as a member of the
+    /// chain becomes a member again at once. Takes constant time.
     pub fn wait_as_spare(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.wait_as_spare(now);

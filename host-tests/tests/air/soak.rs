@@ -2,11 +2,12 @@
 
 use host_tests::fixtures::mission;
 use uav_relay_sim::report::ChainReport;
+use uav_relay_sim::simulator::chain::undisturbed;
 use uav_relay_sim::simulator::chain::{run, run_seeds};
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
-use uav_relay_sim::simulator::watch::{Watched, undisturbed};
+use uav_relay_sim::simulator::watch::Watched;
 
 use super::*;
 

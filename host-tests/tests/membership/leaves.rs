@@ -48,6 +48,19 @@ pub(crate) fn departing(relays: u16, leaves: &[(u16, Option<u16>)]) -> Setup {
     setup
 }
 
+/// Returns the numbers of relays of the views that were accepted one after the other.
+fn sizes(outcome: &Outcome) -> Vec<u16> {
+    let moments = outcome.moments.iter();
+    let mut sizes: Vec<u16> = moments
+        .filter_map(|moment| match moment.what {
+            TimelineEvent::ViewAccepted { relays, .. } => Some(relays),
+            _ => None,
+        })
+        .collect();
+    sizes.dedup();
+    sizes
+}
+
 fn is_loss(what: TimelineEvent) -> bool {
     matches!(
         what,
@@ -391,18 +404,9 @@ fn a_spare_joins_before_a_relay_leaves() {
         setup.spares = vec![spare];
         let outcome = run(setup.clone()).unwrap();
         let name = format!("spare {spare}, leaver {leaver}");
-        let sizes: Vec<u16> = outcome
-            .moments
-            .iter()
-            .filter_map(|moment| match moment.what {
-                TimelineEvent::ViewAccepted { relays, .. } => Some(relays),
-                _ => None,
-            })
-            .collect();
+        let sizes = sizes(&outcome);
         let free = freed(&outcome, leaver).unwrap_or_else(|| panic!("{name}: {sizes:?}"));
         println!("{name}: free after {free:.1} s");
-        let mut sizes = sizes.clone();
-        sizes.dedup();
         assert_eq!(sizes, [8, 9, 8], "{name}");
         // A relay tells its firmware once of the spare, and once of the leaver: not at each of their hellos.
         let told = |relay| times(&outcome, relay, |what| what == TimelineEvent::MayLeaveTold).len();
@@ -470,16 +474,72 @@ fn one_spare_joins_for_one_departure() {
     setup.spares = vec![1, 9];
     setup.settings.respacing = Duration::from_millis(10_000);
     let outcome = run(setup.clone()).unwrap();
-    let moments = outcome.moments.iter();
-    let mut sizes: Vec<u16> = moments
-        .filter_map(|moment| match moment.what {
-            TimelineEvent::ViewAccepted { relays, .. } => Some(relays),
-            _ => None,
-        })
-        .collect();
-    sizes.dedup();
+    let sizes = sizes(&outcome);
     println!("{sizes:?}, free after {:?} s", freed(&outcome, 2));
     assert_eq!(sizes, [7, 8, 7]);
+}
+
+/// Checks that one of two spares in one gap joins for one departure. The same relays receive both in turn.
+#[test]
+fn one_of_two_spares_in_a_gap_is_called() {
+    for (spares, leaver) in [([5, 6], 2), ([5, 6], 4), ([1, 2], 5), ([8, 9], 4)] {
+        for seed in 1..=20 {
+            let mut setup = departing(9, &[(leaver, None)]);
+            setup.spares = spares.to_vec();
+            setup.seed = seed;
+            let outcome = run(setup).unwrap();
+            let sizes = sizes(&outcome);
+            let name = format!("SEED={seed}: spares {spares:?}, leaver {leaver}");
+            assert_eq!(sizes, [7, 8, 7], "{name}");
+            assert!(freed(&outcome, leaver).is_some(), "{name}");
+        }
+    }
+}
+
+/// Checks that a called spare takes no relay that searches for its neighbour for the end of the chain.
+///
+/// Relay 6 dies while the spare 5 receives no call. The call arrives at various times of the search of relay 4. The
+/// next view has all seven relays that are left, not only those up to the spare.
+#[test]
+fn a_relay_that_searches_calls_no_spare() {
+    for tenths in 120..260 {
+        let mut setup = departing(9, &[(2, None)]);
+        setup.spares = vec![5];
+        setup.kills = vec![(6, seconds(AT_S + 1))];
+        let until = Instant::from_millis(1_000 * AT_S + 100 * tenths);
+        setup.deaf = without(&[5])
+            .into_iter()
+            .chain([9])
+            .map(|of| OneWayFailure {
+                by: 5,
+                of,
+                from: seconds(AT_S),
+                until: Some(until),
+            })
+            .collect();
+        let outcome = run(setup).unwrap();
+        let sizes = sizes(&outcome);
+        assert!(sizes[1] >= 7, "{tenths} tenths: {sizes:?}");
+    }
+}
+
+/// Checks that a relay that joined as a spare, and restarts in flight, is a member of the chain again.
+///
+/// Its firmware makes it a spare at every start.
+#[test]
+fn a_spare_that_has_joined_is_a_member_after_a_restart() {
+    for (spare, leaver) in [(5, 3), (9, 8), (1, 2)] {
+        let mut setup = departing(9, &[(leaver, None)]);
+        setup.spares = vec![spare];
+        setup.kills = vec![(spare, seconds(AT_S + 100))];
+        setup.boots = vec![(spare, seconds(AT_S + 103))];
+        let outcome = run(setup.clone()).unwrap();
+        let name = format!("spare {spare}, leaver {leaver}");
+        let left: Vec<u16> = (1..=9).filter(|relay| *relay != leaver).collect();
+        judge(&setup, &outcome, &left).unwrap_or_else(|what| panic!("{name}: {what}"));
+        let sizes = sizes(&outcome);
+        assert_eq!(sizes, [8, 9, 8], "{name}");
+    }
 }
 
 /// Checks that a departure waits for a spare whose hellos are lost for a time.

@@ -10,7 +10,7 @@
 //! | order to leave; both neighbours have selected the relay beyond (the only one at an end) | go outside; keep the setpoint |
 //! | order for the neighbour to leave, received by all | ask the nodes beyond it for a hello; at the end of the chain: give up the neighbour |
 //! | hello of the node beyond the neighbour that is ordered to leave | select it |
-//! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
+//! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up, or call it if it is a spare that the view still has |
 //! | outside, hello of a member: it has a neighbour beyond this relay in a later view, which is complete and in place | raise `MayLeave` |
 //! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost; without endurance only by `stay` |
 
@@ -24,7 +24,7 @@ use crate::settings::{Settings, Wiring};
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::message::{Hello, Requests};
+use crate::wire::message::{Hello, Orders, Requests};
 
 /// Maximum deviation in each of x, y and altitude at which a drone counts as in place, m. In place means at its agreed
 /// position, or as near to it as the guard permits beside a lost drone.
@@ -91,9 +91,9 @@ pub(crate) struct Leaving {
     ///
     /// At a spare that has not joined yet: time of the first call.
     ordered_at: Option<Instant>,
-    /// Time at which this relay follows the last orders again.
+    /// Time at which this relay follows the last orders again. At a spare that waits outside: end of its call.
     ///
-    /// It is 0 if the orders name no relay and this relay requests nothing.
+    /// It is 0 if the orders name no relay, this relay requests nothing, and is not called.
     repeat_at: Instant,
     /// Last reported position of the drone; `None` until a position is reported.
     place: Option<Placement>,
@@ -351,7 +351,8 @@ impl Node {
         leaving.free = false;
         leaving.end_order();
         for side in [Side::Upstream, Side::Downstream] {
-            self.layers.neighbours.at_mut(side).give_up(now, false);
+            let ends = !self.member.is_relay(self.member.beyond(side, 1));
+            self.layers.neighbours.at_mut(side).give_up(now, ends);
             self.layers.neighbours.at_mut(side).forget_losses(now);
         }
         if self.layers.round.is_idle() {
@@ -411,11 +412,23 @@ impl Node {
         }
     }
 
-    /// Returns true if the leader calls node `to` at `side`, outside of the chain, to join the chain.
+    /// Returns true if node `to` at `side`, outside of the chain, is called to join the chain.
+    ///
+    /// The leader calls a spare. A relay that searches for its neighbour does not pass the call on, because it may look
+    /// like the end of the chain. A spare that is still this relay's neighbour in the view has restarted, and is called
+    /// at once.
     pub(super) fn calls_to_join(&self, side: Side, to: u16) -> bool {
-        self.layers.lease.orders().joiner == to
-            && self.is_beside(side, to)
-            && !self.steering.has_lost(side)
+        let (lease, neighbour) = (&self.layers.lease, self.layers.neighbours.at(side));
+        let is_called = if neighbour.node() == to {
+            let distance = to.abs_diff(self.member.node);
+            neighbour.is_agreed() && neighbour.selected_by(distance) == 0
+        } else {
+            lease.orders().joiner == to
+                && self.is_beside(side, to)
+                && (neighbour.is_mutual() || neighbour.has_no_peer())
+                && !self.steering.has_lost(side)
+        };
+        is_called && lease.until().is_some()
     }
 
     /// Updates the position that this relay must reach to report that it is in place. `destination` is the position to
@@ -455,22 +468,7 @@ impl Node {
     /// Follows the leader's orders in the last lease renewal.
     pub(super) fn follow_orders(&mut self, now: Instant) {
         let orders = self.layers.lease.orders();
-        let leaving = &mut self.layers.leaving;
-        let waits = leaving.requested && !leaving.is_outside();
-        let names_relay = orders.leaver != 0 || orders.joiner != 0;
-        if !waits && !names_relay {
-            leaving.repeat_at = Instant::ZERO;
-        } else if leaving.repeat_at <= now {
-            leaving.repeat_at = now + self.member.settings.hop_time.times(REPEATED_AFTER);
-        }
-        if orders.leaver == self.member.node && self.layers.leaving.requested {
-            let blocked = self.member.settings.dead_after.times(2 * BLOCKED_AFTER);
-            let at = self.layers.leaving.ordered_at;
-            let at = at.filter(|at| now.since(*at) < blocked);
-            self.layers.leaving.ordered_at = Some(at.unwrap_or(now));
-        } else if orders.leaver != 0 {
-            self.layers.leaving.end_order();
-        }
+        self.record_orders(now, orders);
         if orders.in_place
             && let Some((side, node)) = self.layers.leaving.waiting.take()
         {
@@ -494,30 +492,54 @@ impl Node {
                 self.schedule_hello(side, node, true);
             }
             // Before the renewal has completed, relays beyond may not have the order.
-            if !leaves || !self.layers.lease.has_completed() {
-                continue;
-            }
-            let Member { index, mission, .. } = &self.member;
-            let is_end = match side {
-                Side::Upstream => *index <= 2,
-                Side::Downstream => index.saturating_add(1) >= mission.relays(),
-            };
-            if is_end {
-                // First the fence beside the relay that leaves moves up to it.
-                self.steer(now);
-                if side == Side::Downstream
-                    && !self.steering.known_guard().is_none_or(Guard::is_answered)
-                {
-                    continue;
-                }
-                self.layers.neighbours.at_mut(side).give_up(now, true);
-                self.steering.set_neighbour(side, None);
-                self.schedule_hello(side, orders.leaver, true);
-            } else {
-                self.layers.neighbours.at_mut(side).schedule_hellos();
+            if leaves && self.layers.lease.has_completed() {
+                self.pass_leaver(now, side, node);
             }
         }
         self.review_neighbours(now);
+    }
+
+    /// Records how long this relay has had its order to leave, and when it follows the orders again.
+    fn record_orders(&mut self, now: Instant, orders: Orders) {
+        let Member { node, settings, .. } = &self.member;
+        let leaving = &mut self.layers.leaving;
+        let waits = leaving.requested && !leaving.is_outside();
+        let names_relay = orders.leaver != 0 || orders.joiner != 0;
+        if !waits && !names_relay {
+            leaving.repeat_at = Instant::ZERO;
+            if leaving.is_spare() {
+                leaving.end_order();
+            }
+        } else if leaving.repeat_at <= now {
+            leaving.repeat_at = now + settings.hop_time.times(REPEATED_AFTER);
+        }
+        if orders.leaver == *node && leaving.requested {
+            let blocked = settings.dead_after.times(2 * BLOCKED_AFTER);
+            let at = leaving.ordered_at.filter(|at| now.since(*at) < blocked);
+            leaving.ordered_at = Some(at.unwrap_or(now));
+        } else if orders.leaver != 0 {
+            leaving.end_order();
+        }
+    }
+
+    /// Asks the nodes beyond `leaver`, the neighbour at `side` that is ordered to leave, for hellos. If the chain ends
+    /// with that neighbour, gives it up.
+    fn pass_leaver(&mut self, now: Instant, side: Side, leaver: u16) {
+        let Member { index, mission, .. } = &self.member;
+        let is_end = match side {
+            Side::Upstream => *index <= 2,
+            Side::Downstream => index.saturating_add(1) >= mission.relays(),
+        };
+        if !is_end {
+            return self.layers.neighbours.at_mut(side).schedule_hellos();
+        }
+        // First the fence beside the relay that leaves moves up to it.
+        self.steer(now);
+        if side == Side::Upstream || self.steering.known_guard().is_none_or(Guard::is_answered) {
+            self.layers.neighbours.at_mut(side).give_up(now, true);
+            self.steering.set_neighbour(side, None);
+            self.schedule_hello(side, leaver, true);
+        }
     }
 
     /// Handles the part of a hello of node `from` that concerns relays outside of the chain. Returns true if the rest
@@ -529,64 +551,85 @@ impl Node {
         from: u16,
         hello: &Hello,
     ) -> bool {
-        let (own, settings) = (self.member.node, self.member.settings);
-        let is_neighbour = self.layers.neighbours.at(side).node() == from;
         if self.layers.leaving.is_outside() {
-            self.layers
-                .neighbours
-                .at_mut(side)
-                .record_unselected(now, &settings);
-            let later = hello.latest_view > self.member.view;
-            let leaving = &mut self.layers.leaving;
-            let [up, down] = leaving.was_end;
-            // The chain goes on beyond this relay as it did before.
-            let goes_on = match (side, hello.neighbour) {
-                (Side::Upstream, 0) => down,
-                (Side::Upstream, beyond) => beyond > own,
-                (Side::Downstream, 0) => up,
-                (Side::Downstream, beyond) => beyond < own,
-            };
-            let is_free = hello.outside && !hello.fresh && later && goes_on;
-            if is_free && !leaving.is_spare() && !leaving.free {
-                leaving.free = true;
-                self.raise(Event::MayLeave);
-            } else if hello.ready && !hello.fresh && leaving.is_spare() {
-                // From a hover the drone begins at once. One that does not hover in time joins all the same.
-                let called_at = *leaving.ordered_at.get_or_insert(now);
-                if self
-                    .steering
-                    .known_guard()
-                    .is_none_or(|guard| guard.may_begin(now))
-                    || now.since(called_at) >= settings.dead_after
-                {
-                    self.come_back(now);
-                    self.layers.leaving.ordered_at = Some(called_at);
-                    if hello.neighbour == 0 {
-                        // The caller is an end of the chain, so this relay is the next end and searches for nobody beyond.
-                        self.layers
-                            .neighbours
-                            .at_mut(side.other())
-                            .give_up(now, true);
-                    }
-                }
-            }
-            return true;
+            self.on_hello_outside(now, side, hello);
+            true
+        } else if hello.is_of_outsider() {
+            self.on_hello_of_outsider(now, side, from, hello);
+            true
+        } else {
+            self.on_hello_of_member(now, side, from, hello)
         }
-        if hello.outside && hello.fresh {
-            if is_neighbour {
-                self.layers.neighbours.at_mut(side).give_up(now, false);
-                self.steering.set_neighbour(side, None);
-            } else if !hello.ready {
-                let leaving = &mut self.layers.leaving;
-                leaving.waiting = Some((side, from));
-                // A spare that requests to leave is one no longer.
-                leaving.heard_spare = leaving.heard_spare.filter(|(node, _)| *node != from);
-            } else if self.is_beside(side, from) && !self.steering.has_lost(side) {
-                // Beside a lost drone that may still hover, a spare could fly into it.
+    }
+
+    /// Handles a hello to this relay outside of the chain: permission to fly away, or call to join.
+    fn on_hello_outside(&mut self, now: Instant, side: Side, hello: &Hello) {
+        let (own, settings) = (self.member.node, self.member.settings);
+        let neighbour = self.layers.neighbours.at_mut(side);
+        neighbour.record_unselected(now, &settings);
+        let later = hello.latest_view > self.member.view;
+        let leaving = &mut self.layers.leaving;
+        let [up, down] = leaving.was_end;
+        // The chain goes on beyond this relay as it did before.
+        let goes_on = match (side, hello.neighbour) {
+            (Side::Upstream, 0) => down,
+            (Side::Upstream, beyond) => beyond > own,
+            (Side::Downstream, 0) => up,
+            (Side::Downstream, beyond) => beyond < own,
+        };
+        let is_free = hello.frees_destination() && later && goes_on;
+        if is_free && !leaving.is_spare() && !leaving.free {
+            leaving.free = true;
+            self.raise(Event::MayLeave);
+        } else if hello.calls_destination() && leaving.is_spare() {
+            // From a hover the drone begins at once. One that does not hover in time joins all the same.
+            let called_at = *leaving.ordered_at.get_or_insert(now);
+            let guard = self.steering.known_guard();
+            if guard.is_none_or(|guard| guard.may_begin(now))
+                || now.since(called_at) >= settings.dead_after
+            {
+                self.come_back(now);
+                self.layers.leaving.ordered_at = Some(called_at);
+                if hello.neighbour == 0 {
+                    // The caller is an end of the chain, so this relay is the next end and searches for nobody beyond.
+                    let beyond = self.layers.neighbours.at_mut(side.other());
+                    beyond.give_up(now, true);
+                }
+            } else {
+                // Without a further call until then, the next one is a new call.
+                leaving.repeat_at = now + settings.dead_after;
+            }
+        }
+    }
+
+    /// Handles a hello of node `from`, which is outside of the chain.
+    fn on_hello_of_outsider(&mut self, now: Instant, side: Side, from: u16, hello: &Hello) {
+        let is_neighbour = self.layers.neighbours.at(side).node() == from;
+        if is_neighbour && hello.ready && self.calls_to_join(side, from) {
+            self.schedule_hello(side, from, false);
+        } else if is_neighbour {
+            self.layers.neighbours.at_mut(side).give_up(now, false);
+            self.steering.set_neighbour(side, None);
+        } else if !hello.ready {
+            let leaving = &mut self.layers.leaving;
+            leaving.waiting = Some((side, from));
+            // A spare that requests to leave is one no longer.
+            leaving.heard_spare = leaving.heard_spare.filter(|(node, _)| *node != from);
+        } else if self.is_beside(side, from) && !self.steering.has_lost(side) {
+            // Beside a lost drone that may still hover, a spare could fly into it. Of several spares the called one
+            // counts, else the one that was received first.
+            let called = self.layers.lease.orders().joiner;
+            let known = self.layers.leaving.spare(now, &self.member.settings);
+            if [0, from].contains(&known) || called == from {
                 self.layers.leaving.heard_spare = Some((from, now));
             }
-            return true;
         }
+    }
+
+    /// Handles a hello of node `from`, a member or a relay that joins. Returns true if this relay leaves the chain now.
+    fn on_hello_of_member(&mut self, now: Instant, side: Side, from: u16, hello: &Hello) -> bool {
+        let own = self.member.node;
+        let is_neighbour = self.layers.neighbours.at(side).node() == from;
         let leaving = &mut self.layers.leaving;
         if is_neighbour && let Some(informed) = leaving.informed.get_mut(side as usize) {
             *informed &= !mask(from.abs_diff(own));

@@ -92,6 +92,6 @@ impl Node {
         from: u16,
         hello: &Hello,
     ) -> bool {
-        hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
+        hello.is_of_outsider() && self.layers.neighbours.at(side).node() != from
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Node;
 use crate::features::{AUTH, TELEMETRY};
-use crate::node::context::Own;
+use crate::node::context::OwnState;
 use crate::node::round::state::Phase;
 use crate::side::Side;
 use crate::stats::bump;
@@ -52,7 +52,7 @@ impl Node {
         let own = if TELEMETRY {
             self.own(now)
         } else {
-            Own::default()
+            OwnState::default()
         };
         let (member, neighbours) = (&self.member, &self.layers.neighbours);
         self.reporting.poll(now, member, neighbours, wait, own)
@@ -72,7 +72,7 @@ impl Node {
         }
     }
 
-    fn own(&self, now: Instant) -> Own {
+    fn own(&self, now: Instant) -> OwnState {
         let hold = |side| self.hold_reason(side).map_or(0, |reason| reason as u16 + 1);
         let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
         let sides = [Side::Upstream, Side::Downstream];
@@ -81,11 +81,12 @@ impl Node {
         let is_duplicated = u16::from(self.duplicate.is_observed(now, &self.member.settings));
         let flags = 512 * (c + 2 * d + 4 * holds_lease) + 28_672 * is_duplicated;
         let state = self.phase() as u16 + 8 * a + 64 * b + flags;
-        let [before, after] = self.refusals(now);
-        (
-            [state, before, after],
-            [self.setpoint(), self.agreed_place()],
-        )
+        OwnState {
+            state,
+            refusals: self.refusals(now),
+            setpoint: self.setpoint(),
+            agreed: self.agreed_place(),
+        }
     }
 
     /// Returns the nearest nodes with a wrong mission, epoch or key, toward Tx and toward Rx; 0 for none.

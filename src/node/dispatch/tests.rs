@@ -1,6 +1,6 @@
 //! Tests of one relay: received messages, and its replies and events.
 
-use crate::event::Event;
+use crate::event::{Event, NodeEvent};
 #[cfg(feature = "departures")]
 use crate::guard::{self, Guard};
 use crate::mission::tests::paper;
@@ -519,4 +519,88 @@ fn an_order_to_leave_comes_before_the_relays_own_request() {
         let leaver = node.steering.known_guard().map(Guard::leaver);
         assert_eq!(leaver, Some(expected));
     }
+}
+
+/// Checks that a second call gives the drone of a spare time to hover, as the first call does.
+#[cfg(feature = "departures")]
+#[test]
+fn the_limit_of_a_second_call_starts_anew() {
+    let settings = Settings {
+        wiring: Wiring::Shared,
+        guard: Some(guard::tests::config()),
+        ..Settings::default()
+    };
+    let identity = Identity {
+        network: 1,
+        index: 2,
+    };
+    let mut node = Node::new(&base(), identity, &settings, 1, Instant::ZERO);
+    node.begin(identity, 1, Instant::ZERO);
+    node.wait_as_spare(Instant::ZERO);
+    let call = hello(&node, node.layers.update.latest());
+    // Every second, from this time on, for this time. The drone never hovers.
+    let mut joins_after = |from_s: u64, most_s: u64| {
+        (0..most_s).find(|after_s| {
+            let now = NOW + Duration::from_millis(1_000 * (from_s + after_s));
+            node.handle_timeout(now);
+            node.handle_message(now, Side::Upstream, 1, &call);
+            node.departure(now) == crate::Departure::Member
+        })
+    };
+    assert_eq!(joins_after(0, 10), None);
+    assert_eq!(joins_after(60, 100), Some(15));
+}
+
+/// Checks that the refusal of a ground station at any accepted distance is reported.
+///
+/// It is reported once a minute, and again after a frame with a new epoch.
+#[test]
+fn a_station_with_an_old_epoch_is_reported_at_any_distance() {
+    for index in 1..=8 {
+        let mut node = relay_of(Mission::try_new(paper(8)).unwrap(), index, true);
+        events(&mut node);
+        for (station, side) in [(0, Side::Upstream), (9, Side::Downstream)] {
+            let told = |node: &mut Node, reason| {
+                node.refuse(NOW, side, station, reason);
+                events(node).len()
+            };
+            assert_eq!(told(&mut node, NodeEvent::Epoch), 1, "{index} {station}");
+            assert_eq!(told(&mut node, NodeEvent::Epoch), 0, "{index} {station}");
+            assert_eq!(told(&mut node, NodeEvent::Mission), 1, "{index} {station}");
+            node.on_key_match(side, station);
+            assert_eq!(told(&mut node, NodeEvent::Epoch), 1, "{index} {station}");
+            assert_eq!(told(&mut node, NodeEvent::Mission), 0, "{index} {station}");
+        }
+        assert_eq!(node.refusals(NOW), [0; 2]);
+    }
+}
+
+/// Checks that a relay calls a spare only with a lease, and not while it searches for its neighbour.
+///
+/// A neighbour that restarts as a spare is called in any case.
+#[cfg(feature = "departures")]
+#[test]
+fn a_relay_with_a_lease_and_neighbours_calls_a_spare() {
+    let mut node = relay_of(Mission::try_new(paper(5)).unwrap(), 3, false);
+    let calls = |node: &Node| node.calls_to_join(Side::Downstream, 4);
+    assert!(!calls(&node));
+    node.layers.lease.set_until(NOW);
+    assert!(calls(&node));
+    node.layers.lease.set_orders(Orders {
+        joiner: 4,
+        ..Orders::NONE
+    });
+    for ends in [false, true] {
+        node.layers
+            .neighbours
+            .at_mut(Side::Downstream)
+            .give_up(NOW, ends);
+        assert_eq!(calls(&node), ends);
+    }
+    node.layers.lease.end();
+    node.layers.lease.set_orders(Orders {
+        joiner: 4,
+        ..Orders::NONE
+    });
+    assert!(!calls(&node));
 }

@@ -113,7 +113,8 @@ impl Hearing {
 /// Nodes on one side of the relay that recently used a wrong mission, an old epoch or a wrong key.
 ///
 /// Bits 0 to 3 stand for nodes with a wrong mission, bits 4 to 7 for nodes with an old epoch, bits 8 to 11 for nodes
-/// with a wrong key; the nearest node is first. A bit remains set for one to two minutes.
+/// with a wrong key; the nearest node is first. Bits 12 to 14 stand for a ground station farther away, in the same
+/// order of the reasons. A bit remains set for one to two minutes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Refusals(RecentBits);
 
@@ -124,17 +125,26 @@ impl Refusals {
     ///
     /// Returns true at most once a minute for each node and reason.
     pub(crate) fn add(&mut self, reason: NodeEvent, distance: u16, now: Instant) -> bool {
-        let first = match reason {
+        let reason = match reason {
             NodeEvent::Mission => 0,
-            NodeEvent::Epoch => CANDIDATES,
-            _ => 2 * CANDIDATES,
+            NodeEvent::Epoch => 1,
+            _ => 2,
         };
-        self.0.set(u16::from(mask(distance)) << first, now, MINUTE)
+        self.0.set(Self::bit(reason, distance), now, MINUTE)
     }
 
     /// Records that the node `distance` relays away uses this relay's key and a new epoch.
     pub(super) fn remove_signer(&mut self, distance: u16) {
-        self.0.clear(u16::from(mask(distance)) * 0x110);
+        self.0
+            .clear(Self::bit(1, distance) | Self::bit(2, distance));
+    }
+
+    /// Returns the bit of the node `distance` relays away, for a reason: 0 mission, 1 epoch, 2 key.
+    const fn bit(reason: u16, distance: u16) -> u16 {
+        match mask(distance) {
+            0 => 0x1000 << reason,
+            near => (near as u16) << (CANDIDATES * reason),
+        }
     }
 
     /// Returns the distances of the nearest nodes that are refused; 0 for none.

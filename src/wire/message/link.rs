@@ -29,10 +29,9 @@ pub struct Hello {
     pub fresh: bool,
     /// Readiness of the sender or of the destination. Its meaning depends on which of them is in the chain.
     ///
-    /// - If both are in the chain: true if the sender could become a relay between the destination and the neighbour that
-    ///   the destination has at present toward the sender.
-    /// - If the sender is outside of the chain: true if it would join the chain when it is called.
-    /// - If the destination is outside of the chain: true if the destination is called to join.
+    /// - Both: true if the sender fits between the destination and the destination's present neighbour toward it.
+    /// - The destination: true if the sender would join the chain when it is called.
+    /// - The sender: true if the destination is called to join (`calls_destination`).
     pub ready: bool,
     /// Number of relays that the destination can reach through the sender, with the sender: 1 to 1000. These relays are
     /// linked in a row that begins with the sender and leads away from the destination.
@@ -52,8 +51,8 @@ pub struct Hello {
     pub refused: bool,
     /// Flag for a node outside of the chain. Its meaning depends on `fresh`.
     ///
-    /// With `fresh`: the sender is outside of the chain, and no relay has it as a neighbour. Without `fresh`: the
-    /// destination is outside of the chain, and the relays have agreed on a view without it and are at their positions.
+    /// With `fresh`, the sender is outside of the chain (`is_of_outsider`). Without `fresh` the destination is, and the
+    /// relays have agreed on a view without it and are at their positions (`frees_destination`).
     pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,
@@ -65,6 +64,21 @@ impl Hello {
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
+    }
+
+    /// Returns true if the sender is outside of the chain. It would then join when it is called, if it is `ready`.
+    pub(crate) const fn is_of_outsider(&self) -> bool {
+        self.outside && self.fresh
+    }
+
+    /// Returns true if the sender calls the destination, which is outside of the chain, to join it.
+    pub(crate) const fn calls_destination(&self) -> bool {
+        self.ready && !self.fresh
+    }
+
+    /// Returns true if the destination, which is outside of the chain, may fly away.
+    pub(crate) const fn frees_destination(&self) -> bool {
+        self.outside && !self.fresh
     }
 
     /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The eight flags share one

@@ -122,6 +122,15 @@ impl Entry {
         self.state.number()
     }
 
+    /// Control state of a drone whose autopilot is not received.
+    pub(crate) const SILENT: u16 = 1;
+    /// Control state of a drone that the relay controls.
+    pub(crate) const ENGAGED: u16 = 4;
+    /// Control state of a drone that the relay controls, without a position.
+    pub(crate) const BLIND: u16 = 5;
+    /// Control state of a drone that the relay controls, but whose autopilot does not fly to the setpoint.
+    pub(crate) const REFUSED: u16 = 6;
+
     /// Returns the number of the drone's control state, from 1; 0 without an autopilot.
     ///
     /// In the states 3 to 6 the drone is in the air: 3 standby, 4 engaged, 5 blind, 6 engaged with a refused setpoint.

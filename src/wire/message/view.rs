@@ -326,9 +326,9 @@ impl Requests {
 
     /// Merges the requests of two parts of the chain. The more urgent departure is kept.
     ///
-    /// If both parts have a spare, the spare of the part with the more urgent departure is kept. If no part has a
-    /// departure, the spare with the lower number is kept.
-    pub(crate) fn merge(self, other: Self) -> Self {
+    /// If both parts have a spare, the one that is `called` is kept, or else that of the part with the more urgent
+    /// departure. If no part has a departure, the spare with the lower number is kept.
+    pub(crate) fn merge(self, other: Self, called: u16) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
             other
@@ -337,6 +337,7 @@ impl Requests {
         };
         let spare = match (self.spare, other.spare) {
             (0, spare) | (spare, 0) => spare,
+            (one, other) if [one, other].contains(&called) => called,
             _ if urgent.leaver != 0 => urgent.spare,
             (one, other) => one.min(other),
         };

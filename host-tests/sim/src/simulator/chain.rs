@@ -4,7 +4,7 @@ mod air;
 mod fleet;
 mod ground;
 mod judge;
-mod live;
+pub mod live;
 mod rotation;
 
 use std::collections::BTreeMap;
@@ -13,9 +13,10 @@ use std::thread;
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use uav_relay::ground::{Ground, Progress};
 use uav_relay::{
-    Identity, Instant, MAX_FRAME, Placement, Port, Relay, Sample, Settings, SetupError, Upload,
-    ViewRecord, Wiring,
+    Duration, Identity, Instant, MAX_FRAME, Placement, Port, Relay, Report, Sample, Settings,
+    SetupError, Side, Upload, ViewRecord, Wiring,
 };
 
 use super::attack::{AttackKind, Attacker, NETWORK};
@@ -27,11 +28,7 @@ use super::outcome::{Film, Outcome, Record, RelayEnd, TimelineEvent};
 use super::rotation::Rotation;
 use super::route::Track;
 use super::setup::Setup;
-use super::watch::{ObservedState, Run, Watch};
-use fleet::LANDS_AFTER;
-use ground::{Station, stations};
-use judge::ChangedRelays;
-pub use live::LiveRelay;
+use super::watch::{ObservedState, Places, Run, Watch, places_of, without_other_relays};
 
 /// Largest number of events in a run. This limit ends runs in which the relays never agree on positions, after some
 /// minutes of computing.
@@ -448,6 +445,87 @@ fn switched_on(
     Ok(relay)
 }
 
+/// Time until a pilot lands a drone, after its relay was switched off or after a permanent takeover.
+///
+/// The operator also waits for this time before confirming that lost drones have landed.
+const LANDS_AFTER: Duration = Duration::from_millis(30_000);
+
+/// Relays whose state an event may have changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum ChangedRelays {
+    None,
+    /// A single relay with this index, from 0.
+    One(usize),
+    /// The event may have changed any number of relays, or the links between them.
+    All,
+}
+
+impl ChangedRelays {
+    fn of(event: &QueuedEvent, index: usize) -> Self {
+        match event {
+            QueuedEvent::Bytes { .. } | QueuedEvent::Wake => Self::One(index),
+            QueuedEvent::Air(_)
+            | QueuedEvent::StationTimeout
+            | QueuedEvent::StationBytes { .. } => Self::None,
+            _ => Self::All,
+        }
+    }
+}
+
+/// Ground station at one end of the chain, Tx or Rx. It uploads missions and measures interference.
+#[derive(Debug)]
+struct Station {
+    end: Side,
+    ground: Ground,
+    line: Line,
+    wake: Option<Instant>,
+    /// Newest report of each relay. The key is the relay's number.
+    reports: BTreeMap<u16, Report>,
+    /// Reports received since the last call of [`Chain::arrived`].
+    arrived: Vec<Report>,
+}
+
+impl Station {
+    /// Returns true while the station uploads a mission.
+    fn is_busy(&self) -> bool {
+        matches!(
+            self.ground.progress(),
+            Progress::Offering | Progress::Stored { .. } | Progress::Adopted { .. }
+        )
+    }
+}
+
+/// Creates the ground stations that upload or measure. None without a network key, because ground stations sign all
+/// frames.
+fn stations(setup: &Setup) -> Vec<Station> {
+    let Some(proof) = setup.proof(1) else {
+        return Vec::new();
+    };
+    let uploads = setup.uploads.iter().map(|spec| spec.end);
+    let watches = setup.watches.iter().map(|(end, _)| *end);
+    let measures = setup
+        .true_interference
+        .as_ref()
+        .filter(|true_interference| true_interference.handed.is_empty());
+    let both = measures.map(|_| [Side::Upstream, Side::Downstream]);
+    let mut ends: Vec<Side> = uploads
+        .chain(watches)
+        .chain(both.into_iter().flatten())
+        .collect();
+    ends.sort();
+    ends.dedup();
+    ends.into_iter()
+        .map(|end| Station {
+            end,
+            ground: Ground::new(&setup.mission, end, NETWORK, setup.settings.wiring, proof),
+            line: Line::default(),
+            wake: None,
+            reports: BTreeMap::new(),
+            arrived: Vec::new(),
+        })
+        .collect()
+}
+
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
@@ -734,4 +812,11 @@ pub fn run_seeds<T: Send>(
     });
     all.sort_by_key(|(at, _)| *at);
     all.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Returns the positions in which a fault-free chain of only the relays `nodes` (from 1) settles.
+///
+/// `version` is the version of the mission that they fly.
+pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {
+    places_of(&run(without_other_relays(setup, nodes, version)?).ok()?)
 }

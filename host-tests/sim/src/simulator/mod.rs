@@ -11,6 +11,7 @@
 //! | [`drones`] | simple drone dynamics with position errors |
 //! | [`fleet`] | drones with simulated autopilots and pilots |
 //! | [`rotation`] | a fleet larger than its chain: batteries, pilots, chargers, and what a run with replacements has shown |
+//! | [`observed`] | states of the relays for the statistics of a run, and groups that fly by one agreement |
 //! | [`route`] | the hops of the data through the chain over time: true rates and time slots |
 //! | [`traffic`] | packets on that route, with a queue at every node |
 //! | [`watch`] | availability of the chain over time, against the longest possible chain and its best positions |
@@ -22,6 +23,7 @@ pub mod drones;
 pub mod faults;
 pub mod fleet;
 pub mod medium;
+pub mod observed;
 pub mod outcome;
 pub mod rotation;
 pub mod route;

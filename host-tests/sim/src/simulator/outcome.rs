@@ -10,10 +10,10 @@ use super::attack::AttackCounts;
 use super::drones::{Nearest, Point};
 use super::faults::Injected;
 use super::medium::AirCounts;
+use super::observed::ObservedState;
 use super::rotation::Rotated;
 use super::route::Track;
 use super::true_interference::Snapshot;
-use super::watch::ObservedState;
 
 /// Kind of an event in the log of a run, about one relay. If the event concerns a second node, [`Moment::other`] is
 /// that node.

@@ -25,8 +25,8 @@ use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::scene::{Place, Relay, Scene};
 
 use super::drones::{Point, apart, placement};
+use super::observed::ObservedState;
 use super::setup::Setup;
-use super::watch::ObservedState;
 use crate::report::hop_sirs;
 
 /// Virtual time or duration, picoseconds.

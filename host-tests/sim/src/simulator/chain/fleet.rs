@@ -4,7 +4,7 @@ use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Departure, Duration, HoldReason, Instant, Side};
 
-use super::{Chain, Member, QueuedEvent};
+use super::{Chain, LANDS_AFTER, Member, QueuedEvent};
 use crate::simulator::drones::{Flight, Nearest, Point, apart, placement, point};
 use crate::simulator::fleet::Vehicle;
 use crate::simulator::outcome::TimelineEvent;
@@ -22,11 +22,6 @@ const LOOKS: Duration = Duration::from_millis(5_000);
 ///
 /// A pilot hands a drone over to its relay only if no moving drone is nearer than the sum of the two distances.
 const TRAFFIC_M: f64 = 30.0;
-
-/// Time until a pilot lands a drone, after its relay was switched off or after a permanent takeover.
-///
-/// The operator also waits for this time before confirming that lost drones have landed.
-pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
     /// Creates the setup's drones with autopilots, if any, on the ground. Schedules their first time step.

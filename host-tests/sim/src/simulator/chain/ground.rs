@@ -1,9 +1,6 @@
 //! Ground stations of a run: uploads, measurements and telemetry.
 
-use std::collections::BTreeMap;
-
 use rand::RngExt;
-use uav_relay::ground::{Ground, Progress};
 use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{
     Duration, Instant, MAX_FRAME, Phase, Placement, Port, Report, Sample, Side, Wiring,
@@ -14,13 +11,11 @@ use uav_relay_scenario::scene::Scene;
 use super::air::{Receiver, link};
 use super::{Chain, Member, QueuedEvent};
 use crate::simulator::attack::{
-    AttackKind, Attacker, ForgedRoute, NETWORK, destination, forge, incremented_counter,
+    AttackKind, Attacker, ForgedRoute, destination, forge, incremented_counter,
 };
 use crate::simulator::drones::{Drone, Point, placement};
-use crate::simulator::faults::Line;
 use crate::simulator::fleet::Vehicle;
 use crate::simulator::outcome::{Link, Moment, TimelineEvent};
-use crate::simulator::setup::Setup;
 use crate::simulator::true_interference::{Snapshot, TrueInterference};
 
 /// Largest number of a station's reports that wait for [`Chain::arrived`].
@@ -207,60 +202,6 @@ impl Chain {
             sweeps: 0,
         });
     }
-}
-
-/// Ground station at one end of the chain, Tx or Rx. It uploads missions and measures interference.
-#[derive(Debug)]
-pub(super) struct Station {
-    pub(super) end: Side,
-    pub(super) ground: Ground,
-    pub(super) line: Line,
-    pub(super) wake: Option<Instant>,
-    /// Newest report of each relay. The key is the relay's number.
-    reports: BTreeMap<u16, Report>,
-    /// Reports received since the last call of [`Chain::arrived`].
-    arrived: Vec<Report>,
-}
-
-impl Station {
-    /// Returns true while the station uploads a mission.
-    pub(super) fn is_busy(&self) -> bool {
-        matches!(
-            self.ground.progress(),
-            Progress::Offering | Progress::Stored { .. } | Progress::Adopted { .. }
-        )
-    }
-}
-
-/// Creates the ground stations that upload or measure. None without a network key, because ground stations sign all
-/// frames.
-pub(super) fn stations(setup: &Setup) -> Vec<Station> {
-    let Some(proof) = setup.proof(1) else {
-        return Vec::new();
-    };
-    let uploads = setup.uploads.iter().map(|spec| spec.end);
-    let watches = setup.watches.iter().map(|(end, _)| *end);
-    let measures = setup
-        .true_interference
-        .as_ref()
-        .filter(|true_interference| true_interference.handed.is_empty());
-    let both = measures.map(|_| [Side::Upstream, Side::Downstream]);
-    let mut ends: Vec<Side> = uploads
-        .chain(watches)
-        .chain(both.into_iter().flatten())
-        .collect();
-    ends.sort();
-    ends.dedup();
-    ends.into_iter()
-        .map(|end| Station {
-            end,
-            ground: Ground::new(&setup.mission, end, NETWORK, setup.settings.wiring, proof),
-            line: Line::default(),
-            wake: None,
-            reports: BTreeMap::new(),
-            arrived: Vec::new(),
-        })
-        .collect()
 }
 
 impl Chain {

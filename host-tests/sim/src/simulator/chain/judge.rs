@@ -4,34 +4,11 @@ use std::ops::Range;
 
 use uav_relay::{Event, Instant, Method, Phase, Placement, Side, Wiring};
 
-use super::ground::Station;
-use super::{Chain, Member, QueuedEvent};
+use super::{Chain, ChangedRelays, Member, QueuedEvent, Station};
 use crate::simulator::drones::point;
 use crate::simulator::outcome::{Ending, Moment, TimelineEvent};
 use crate::simulator::route::RelayState;
 use crate::simulator::watch::{ObservedState, Run, Watch, longest};
-
-/// Relays whose state an event may have changed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum ChangedRelays {
-    None,
-    /// A single relay with this index, from 0.
-    One(usize),
-    /// The event may have changed any number of relays, or the links between them.
-    All,
-}
-
-impl ChangedRelays {
-    pub(super) fn of(event: &QueuedEvent, index: usize) -> Self {
-        match event {
-            QueuedEvent::Bytes { .. } | QueuedEvent::Wake => Self::One(index),
-            QueuedEvent::Air(_)
-            | QueuedEvent::StationTimeout
-            | QueuedEvent::StationBytes { .. } => Self::None,
-            _ => Self::All,
-        }
-    }
-}
 
 impl Chain {
     /// Starts the statistics of the run.

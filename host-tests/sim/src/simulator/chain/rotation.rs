@@ -3,7 +3,7 @@
 use rand::RngExt;
 use uav_relay::{Departure, Duration, HoldReason, Instant, Relay, Side};
 
-use super::{Chain, ChangedRelays, QueuedEvent};
+use super::{Chain, ChangedRelays, QueuedEvent, undisturbed};
 use crate::report::{hop_sirs, hop_sirs_back};
 use crate::simulator::drones::{
     Drone, Flight, FlightSpec, Nearest, Point, apart, placement, point,
@@ -13,7 +13,7 @@ use crate::simulator::rotation::{
     Battery, CLIMB_MPS, DipCause, DipState, Duty, Encounter, GOOD, MOVING, NearDrone, Rotated,
     Rotation, RotationSpec, SPEED_MPS, duration,
 };
-use crate::simulator::watch::{ObservedState, has_agreed, undisturbed};
+use crate::simulator::watch::{ObservedState, has_agreed};
 
 /// Time step of the simulation while a drone moves.
 const STEP: Duration = Duration::from_millis(100);
