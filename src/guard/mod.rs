@@ -137,7 +137,7 @@ pub struct Guard {
     refused: u32,
 }
 
-/// Number of quarters of a second between two messages of a relay that stays in place without flying to setpoints.
+/// Quarters of a second between two messages of a relay that hovers without flying to setpoints.
 const UNFLOWN_EVERY: u8 = 16;
 
 /// Number of seconds with an unknown order along x after which messages are no longer repeated early.
@@ -527,8 +527,9 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns the sides at which this relay waits for a message of its neighbour: for the first fence of the neighbour
-    /// toward Tx, and for the answer of the neighbour toward Rx to the newest fence. False after a long wait.
+    /// Returns the sides at which this relay waits for a message of its neighbour. None after a long wait.
+    ///
+    /// The message is the first fence of the neighbour toward Tx, or the answer to this relay's newest fence.
     fn awaits(&self) -> [bool; 2] {
         let begun = self.own.setpoint.is_some() && self.unordered < MAX_EARLY;
         let (up, down) = (&self.follower.association, &self.owner.association);
@@ -548,7 +549,7 @@ impl Guard {
         self.reminders &= !3;
     }
 
-    /// Ends the second: the next call of [`remind_early`](Self::remind_early) is a [`remind`](Self::remind).
+    /// Ends the second: the next early reminder is a [`remind`](Self::remind).
     pub const fn end_second(&mut self) {
         self.reminders |= 3;
     }

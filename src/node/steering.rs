@@ -13,8 +13,7 @@ use crate::time::{Duration, Instant};
 /// plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
-/// Shortest interval of these repetitions while the relay waits for a neighbour's message. On a slow channel it is eight
-/// hop times, at most [`REMINDER`].
+/// Shortest interval of these repetitions while the relay waits for a neighbour's message.
 const EARLY: Duration = Duration::from_millis(250);
 
 /// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
@@ -149,7 +148,7 @@ impl Respacing {
     }
 }
 
-/// Returns the interval of the fence messages while the relay waits for a neighbour's message.
+/// Returns the interval of the fence messages of a waiting relay: eight hop times, 250 ms to 1 s.
 fn early(hop_time: Duration) -> Duration {
     hop_time.times(8).max(EARLY).min(REMINDER)
 }

@@ -534,8 +534,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Checks that relays repeat their messages several times a second while they wait for a message of their neighbour, and
-/// not afterwards.
+/// Checks that relays repeat their messages early only while they wait for a neighbour's message.
 #[test]
 fn a_relay_that_waits_repeats_its_messages_early() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);

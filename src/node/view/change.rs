@@ -655,10 +655,9 @@ impl ViewRequest {
         true
     }
 
-    /// Returns the waiting time before the next view request: 8 hop times, doubled with each call up to 32 hop times.
+    /// Returns the waiting time before the next view request: 8, 16, then 32 hop times.
     ///
-    /// Each relay on the way to the leader repeats the request on its own. So on a channel that loses frames, a longer
-    /// wait would add up over the hops.
+    /// Each relay on the way to the leader repeats the request. So longer waits would add up over the hops.
     fn patience(&mut self, settings: &Settings) -> Duration {
         let wait = settings.hop_time.times(8 << self.tries.min(2));
         self.tries = self.tries.saturating_add(1);
