@@ -530,6 +530,7 @@ impl Guard {
     /// Returns the sides at which this relay waits for a message of its neighbour. None after a long wait.
     ///
     /// The message is the first fence of the neighbour toward Tx, or the answer to this relay's newest fence.
+    #[inline(never)] // called from several places
     fn awaits(&self) -> [bool; 2] {
         let begun = self.own.setpoint.is_some() && self.unordered < MAX_EARLY;
         let (up, down) = (&self.follower.association, &self.owner.association);
