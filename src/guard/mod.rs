@@ -134,12 +134,16 @@ pub struct Guard {
     disorder: bool,
     /// Number of successive reminders (calls of `remind`, one per second) with an unknown order along x.
     unordered: u8,
+    /// Quarters of a second that reminders have counted.
     reminders: u8,
     refused: u32,
 }
 
-/// Number of seconds between two messages of a relay that stays in place without flying to setpoints.
-const UNFLOWN_EVERY: u8 = 4;
+/// Quarters of a second between two messages of a relay that hovers without flying to setpoints.
+const UNFLOWN_EVERY: u8 = 16;
+
+/// Number of seconds with an unknown order along x after which messages are no longer repeated early.
+const MAX_EARLY: u8 = 30;
 
 /// Number of seconds after which an unknown order along x halts the chain.
 const MAX_UNORDERED: u8 = 3;
@@ -515,7 +519,7 @@ impl Guard {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         self.own.count_reminder();
         // A relay without an association sends its position less often, unless it moves.
-        self.reminders = self.reminders.wrapping_add(1);
+        self.reminders = (self.reminders & !3).wrapping_add(4);
         let sends = begun || self.own.has_moved() || self.reminders.is_multiple_of(UNFLOWN_EVERY);
         up.due |= follower && (sends || up.sends_halt());
         down.due |= owner && (sends || down.sends_halt());
@@ -523,6 +527,47 @@ impl Guard {
         down.count_reminder();
         let leaves = up.remind() | down.remind();
         follower || owner || leaves
+    }
+
+    /// Returns the sides at which this relay waits for a message of its neighbour. None after a long wait.
+    ///
+    /// The message is the first fence of the neighbour toward Tx, or the answer to this relay's newest fence.
+    #[inline(never)] // called from several places
+    fn awaits(&self) -> [bool; 2] {
+        let begun = self.own.setpoint.is_some() && self.unordered < MAX_EARLY;
+        let (up, down) = (&self.follower.association, &self.owner.association);
+        [
+            begun && !up.has_no_flown_neighbour() && !self.follower.has_fence(),
+            begun && !down.has_no_flown_neighbour() && !self.owner.is_received(),
+        ]
+    }
+
+    /// Returns true if this relay waits for a message of a neighbour.
+    pub fn is_waiting(&self) -> bool {
+        self.awaits() != [false; 2]
+    }
+
+    /// Restarts the second that ends with the next [`remind`](Self::remind).
+    pub const fn restart_second(&mut self) {
+        self.reminders &= !3;
+    }
+
+    /// Ends the second: the next early reminder is a [`remind`](Self::remind).
+    pub const fn end_second(&mut self) {
+        self.reminders |= 3;
+    }
+
+    /// Schedules a repetition of the messages to the neighbours for whose messages this relay waits. Call it `times`
+    /// times a second, 1 to 4; each last call of a second is a [`remind`](Self::remind).
+    pub fn remind_early(&mut self, times: u8) {
+        if (self.reminders & 3) + 1 >= times {
+            self.remind();
+            return;
+        }
+        self.reminders = self.reminders.wrapping_add(1);
+        let [up, down] = self.awaits();
+        self.follower.association.due |= up;
+        self.owner.association.due |= down;
     }
 
     /// Returns true if a position report has shown the relay at its agreed position. The setpoint must be the agreed

@@ -282,6 +282,11 @@ impl FenceOwner {
             && self.role.follower_low_m >= self.fence_m
     }
 
+    /// Returns true if the downstream neighbour has received the newest fence.
+    pub(super) const fn is_received(&self) -> bool {
+        self.has_reply() && self.is_acknowledged
+    }
+
     /// Returns true unless the downstream neighbour still has to answer the newest fence. It has to answer
     /// none before its first message, and while it does not fly to setpoints.
     pub(super) fn is_answered(&self) -> bool {

@@ -13,6 +13,9 @@ use crate::time::{Duration, Instant};
 /// plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
+/// Shortest interval of these repetitions while the relay waits for a neighbour's message.
+const EARLY: Duration = Duration::from_millis(250);
+
 /// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
 #[derive(Clone, Debug)]
 pub(crate) struct Steering {
@@ -145,6 +148,11 @@ impl Respacing {
     }
 }
 
+/// Returns the interval of the fence messages of a waiting relay: eight hop times, 250 ms to 1 s.
+fn early(hop_time: Duration) -> Duration {
+    hop_time.times(8).max(EARLY).min(REMINDER)
+}
+
 impl Steering {
     /// State before the call of [`begin`](Self::begin): no guard (collision avoidance), and no setpoint.
     pub(crate) const NONE: Self = Self {
@@ -179,11 +187,13 @@ impl Steering {
 
     /// Moves the setpoint toward the position `agreed` as far as the guard allows at `now`. Returns true if the
     /// setpoint has changed. If `agreed` is new, the motion to it begins at `begin`, and takes the time `span`.
+    ///
+    /// `hop_time` is the setting of this name.
     pub(crate) fn steer(
         &mut self,
         now: Instant,
         agreed: Option<Placement>,
-        span: Duration,
+        (span, hop_time): (Duration, Duration),
         begin: Begin,
     ) -> bool {
         let waypoint = match self.respacing.first_mut() {
@@ -199,7 +209,17 @@ impl Steering {
             }
             guard.steer(now);
             if !known {
+                guard.end_second();
+            }
+            let soon = Some(now + early(hop_time)).filter(|_| guard.is_waiting());
+            if !known {
                 self.remind_at = Some(now + REMINDER);
+            }
+            if let Some(soon) = soon.filter(|soon| self.remind_at.is_none_or(|at| at > *soon)) {
+                self.remind_at = Some(soon);
+                if let Some(guard) = self.guard() {
+                    guard.restart_second();
+                }
             }
         }
         let setpoint = self.setpoint(waypoint);
@@ -250,12 +270,20 @@ impl Steering {
     }
 
     /// Schedules the fence messages to both neighbours again if their timer has expired.
-    pub(crate) fn handle_timeout(&mut self, now: Instant) {
+    pub(crate) fn handle_timeout(&mut self, now: Instant, hop_time: Duration) {
         if self.remind_at.is_some_and(|at| at <= now) {
             self.remind_at = None;
             if let Some(guard) = self.guard() {
-                guard.remind();
-                self.remind_at = Some(now + REMINDER);
+                let early = early(hop_time);
+                let times = REMINDER.as_micros() / early.as_micros();
+                guard.remind_early(u8::try_from(times).unwrap_or(1));
+                let wait = if guard.is_waiting() {
+                    early
+                } else {
+                    guard.end_second();
+                    REMINDER
+                };
+                self.remind_at = Some(now + wait);
             }
         }
     }
@@ -349,6 +377,8 @@ mod tests {
         Begin::By(Instant::from_millis(now_ms + 15_000))
     }
 
+    const HOP: Duration = Duration::from_millis(30);
+
     fn at_ms(ms: u64) -> Instant {
         Instant::ZERO + Duration::from_millis(ms)
     }
@@ -359,12 +389,12 @@ mod tests {
         let span = Duration::from_millis(20_000);
         let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
         let mut all = [Steering::NONE; 2].map(|mut steering| {
-            steering.steer(at_ms(0), place(0.0), span, unknown(0));
+            steering.steer(at_ms(0), place(0.0), (span, HOP), unknown(0));
             steering
         });
         let [one, other] = &mut all;
-        one.steer(at_ms(1_000), place(100.0), span, unknown(1_000));
-        other.steer(at_ms(2_300), place(100.0), span, unknown(2_300));
+        one.steer(at_ms(1_000), place(100.0), (span, HOP), unknown(1_000));
+        other.steer(at_ms(2_300), place(100.0), (span, HOP), unknown(2_300));
         for ms in (2_500..30_000).step_by(500) {
             // The second one learns the beginning after it.
             let begin = |known_at: u64| {
@@ -374,8 +404,8 @@ mod tests {
                     unknown(ms)
                 }
             };
-            one.steer(at_ms(ms), place(100.0), span, begin(2_500));
-            other.steer(at_ms(ms), place(100.0), span, begin(4_500));
+            one.steer(at_ms(ms), place(100.0), (span, HOP), begin(2_500));
+            other.steer(at_ms(ms), place(100.0), (span, HOP), begin(4_500));
             let [x_m, other_m] = [&one, &other].map(|it| it.setpoint(place(100.0)).unwrap().x_m);
             assert!(ms > 3_000 || x_m == 0.0, "{ms}: {x_m}");
             let apart_m = (x_m - other_m).abs();
@@ -383,10 +413,10 @@ mod tests {
             assert_eq!(one.is_moving(), ms < 23_000, "{ms}: {x_m}");
         }
         // Without a beginning, after the longest wait.
-        one.steer(at_ms(30_000), place(0.0), span, unknown(30_000));
-        one.steer(at_ms(44_900), place(0.0), span, unknown(44_900));
+        one.steer(at_ms(30_000), place(0.0), (span, HOP), unknown(30_000));
+        one.steer(at_ms(44_900), place(0.0), (span, HOP), unknown(44_900));
         assert_eq!(one.setpoint(place(0.0)), place(100.0));
-        one.steer(at_ms(55_000), place(0.0), span, unknown(55_000));
+        one.steer(at_ms(55_000), place(0.0), (span, HOP), unknown(55_000));
         let half_m = one.setpoint(place(0.0)).unwrap().x_m;
         assert!((half_m - 50.0).abs() < 0.1, "{half_m}");
     }
@@ -397,13 +427,18 @@ mod tests {
         let span = Duration::from_millis(20_000);
         let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
         let mut steering = Steering::NONE;
-        steering.steer(at_ms(0), place(0.0), span, unknown(0));
+        steering.steer(at_ms(0), place(0.0), (span, HOP), unknown(0));
         let mut reached_m = 0.0;
         let mut agreed = None;
         for step in 0..20 {
             // Every second another agreement, a little farther.
             agreed = place(100.0 + step as f32 / 10.0);
-            steering.steer(at_ms(1_000 * step), agreed, span, Begin::At(at_ms(0)));
+            steering.steer(
+                at_ms(1_000 * step),
+                agreed,
+                (span, HOP),
+                Begin::At(at_ms(0)),
+            );
             let x_m = steering.setpoint(agreed).unwrap().x_m;
             assert!(
                 x_m >= reached_m && x_m <= reached_m + 10.0,
@@ -411,7 +446,7 @@ mod tests {
             );
             reached_m = x_m;
         }
-        steering.steer(at_ms(20_000), agreed, span, Begin::At(at_ms(0)));
+        steering.steer(at_ms(20_000), agreed, (span, HOP), Begin::At(at_ms(0)));
         assert!(!steering.is_moving() && steering.setpoint(agreed) == agreed);
     }
 }

@@ -534,6 +534,31 @@ fn no_relay_moves_before_its_neighbour_is_received() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
+/// Checks that relays repeat their messages early only while they wait for a neighbour's message.
+#[test]
+fn a_relay_that_waits_repeats_its_messages_early() {
+    let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
+    let drain = |one: &mut One| core::iter::from_fn(|| one.guard.poll()).count();
+    for one in [&mut pair.owner, &mut pair.follower] {
+        assert!(drain(one) > 0 && one.guard.is_waiting());
+        for early in 1..=3 {
+            one.guard.remind_early(4);
+            assert_eq!(drain(one), 1, "reminder {early}");
+        }
+    }
+    pair.talk();
+    pair.talk();
+    for one in [&mut pair.owner, &mut pair.follower] {
+        drain(one);
+        one.guard.restart_second();
+        assert!(!one.guard.is_waiting());
+        for early in 1..=3 {
+            one.guard.remind_early(4);
+            assert_eq!(drain(one), 0, "reminder {early}");
+        }
+    }
+}
+
 /// Checks rules 3, 4 and 6 of the guard for moves toward Rx. Relay 1 advances only as far as relay 2 has moved.
 #[test]
 fn the_owner_follows_the_follower() {

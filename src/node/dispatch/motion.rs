@@ -52,7 +52,8 @@ impl Node {
         let lead = self.member.settings.hop_time.times(4 * relays);
         let turned_at = self.layers.lease.turned_at();
         let begin = turned_at.map_or(Begin::By(now + WAIT + lead), |at| Begin::At(at + lead));
-        if self.steering.steer(now, destination, span, begin) {
+        let spans = (span, self.member.settings.hop_time);
+        if self.steering.steer(now, destination, spans, begin) {
             self.raise(Event::SetpointChanged);
         }
         self.update_goal(destination);

@@ -52,7 +52,8 @@ impl Node {
             self.apply(now, effects);
         }
         self.layers.update.handle_timeout(now);
-        self.steering.handle_timeout(now);
+        self.steering
+            .handle_timeout(now, self.member.settings.hop_time);
         self.reporting.handle_timeout(now);
         self.steer(now);
     }

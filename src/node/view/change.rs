@@ -13,7 +13,7 @@
 //! vote would suffice. A proposal is bound to the node that it was forwarded to. If that neighbour is lost or replaced,
 //! this relay requests a later view.
 //!
-//! The first request for a view is sent at once. Repetitions follow less and less often.
+//! The first request for a view is sent at once. It is repeated until a view is decided.
 
 use crate::node::circulation::{Circulation, LateMessages, Reply};
 use crate::node::context::{
@@ -541,7 +541,7 @@ pub(super) struct ViewDecision {
 /// | situation | wait before the request | set by |
 /// | --- | --- | --- |
 /// | reason for a new view, such as a changed neighbour | 250 us | `request_now` |
-/// | repetition without a result | 8 hop times at first, each time doubled, at most `probe_after` | `poll_due` |
+/// | repetition without a result | 8, 16, then 32 hop times, at most `probe_after` | `poll_due` |
 /// | refused view | about `probe_after`, doubled with each refusal in a row, at most three times | `request_after_refusal` |
 /// | new reason after a refusal | the rest of the first `probe_after` | `start` |
 /// | no pass along the chain since the start | `probe_after` and a round trip, or the time of a first pass if longer | `Node::await_first` |
@@ -655,9 +655,11 @@ impl ViewRequest {
         true
     }
 
-    /// Returns the waiting time before the next view request. The time doubles with each call, up to `probe_after`.
+    /// Returns the waiting time before the next view request: 8, 16, then 32 hop times.
+    ///
+    /// Each relay on the way to the leader repeats the request. So longer waits would add up over the hops.
     fn patience(&mut self, settings: &Settings) -> Duration {
-        let wait = settings.hop_time.times(8 << self.tries.min(12));
+        let wait = settings.hop_time.times(8 << self.tries.min(2));
         self.tries = self.tries.saturating_add(1);
         wait.min(settings.probe_after)
     }

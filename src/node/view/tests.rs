@@ -501,6 +501,23 @@ fn a_refused_leader_proposes_again_later() {
     assert!(again >= relay.now + relay.member.settings.probe_after);
 }
 
+/// Checks that a relay repeats its request for a view often, as long as no decision arrives. On a channel that loses
+/// half of all frames, each hop toward the leader would otherwise wait for several seconds.
+#[test]
+fn a_request_for_a_view_is_repeated_often() {
+    let mut relay = Relay::second();
+    let most = relay.member.settings.hop_time.times(32);
+    relay.view.request.start(relay.now);
+    for _ in 0..20 {
+        let at = relay.view.request.next_timeout().unwrap();
+        assert!(at.since(relay.now) <= most, "{at:?} after {:?}", relay.now);
+        relay.now = at;
+        let context = context(&relay.member, relay.latest, relay.end, relay.now);
+        let effects = relay.view.handle_timeout(&context, false, false);
+        assert_eq!(effects.event, Some(LayerEvent::RequestView));
+    }
+}
+
 #[test]
 fn a_leader_proposes_later_views_one_at_a_time() {
     let mut relay = Relay::new(1);

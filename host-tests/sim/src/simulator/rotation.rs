@@ -220,7 +220,7 @@ pub(super) struct Rotation {
     pub(super) next: Instant,
     pub(super) pilots_at: Instant,
     pub(super) last_take_off: Instant,
-    /// Moving average of the time from a request to leave until the relay has left, s.
+    /// Time from a request to leave until the relay has left, s. A decaying maximum.
     pub(super) slot_s: f64,
     /// Distance that pilots keep between two drones, m.
     pub(super) spacing_m: f64,

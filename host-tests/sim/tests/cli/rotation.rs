@@ -40,10 +40,10 @@ fn a_fleet_replaces_its_tired_drones_on_a_channel_that_loses_frames() {
     let runs = [
         (6, 4, 0.0, 0.001, 0),
         (3, 2, 0.0, 0.001, 0),
-        (6, 4, 0.3, 0.005, 0),
-        (6, 4, 0.5, 0.01, 0),
-        (12, 8, 0.3, 0.013, 0),
-        (12, 8, 0.5, 0.07, 1),
+        (6, 4, 0.3, 0.001, 0),
+        (6, 4, 0.5, 0.002, 0),
+        (12, 8, 0.3, 0.001, 0),
+        (12, 8, 0.5, 0.018, 0),
     ];
     for (fleet, flying, loss, most_below, most_forced) in runs {
         let report = json(&format!(

@@ -574,7 +574,8 @@ impl Chain {
             record.least_left_s = Some(least_s.min(left_s + crate::simulator::rotation::RESERVE_S));
         }
         if waited_s > 0.0 {
-            rotation.slot_s += (waited_s - rotation.slot_s) / 8.0;
+            let lower_s = rotation.slot_s + (waited_s - rotation.slot_s) / 8.0;
+            rotation.slot_s = waited_s.max(lower_s);
         }
         if forced || !rotation.spec.announced {
             self.switch_off(index);
@@ -616,6 +617,15 @@ impl Chain {
         let (waiting, moving): (Vec<_>, Vec<_>) =
             standby.partition(|it| now.since(it.hovers_since) >= HOVERS);
         let spares = if moving.is_empty() { waiting.len() } else { 0 };
+        // Spares that the chain needs in any case are not there for a departure.
+        let present = self.members.iter().zip(&rotation.drones);
+        let present = present.filter(|(member, drone)| {
+            let departure = member.relay.departure(now);
+            let stays = !matches!(departure, Departure::Outside | Departure::Free);
+            drone.duty == Duty::Serving && member.killed.is_none() && stays
+        });
+        let missing = usize::from(rotation.spec.flying).saturating_sub(present.count());
+        let spares = spares.saturating_sub(missing);
         let mut requests = 0;
         for (at, (index, start_s, left_s)) in starts.into_iter().enumerate() {
             let Some(drone) = rotation.drones.get_mut(index) else {

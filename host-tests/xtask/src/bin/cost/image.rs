@@ -72,13 +72,13 @@ const IMAGES: &[Image] = &[
         "flash of the relay image with `guard`",
         RELAY,
         &["--no-default-features", "--features", "guard"],
-        [76 * 1024 + 768, 5_824, 4_224],
+        [77 * 1024 + 256, 5_824, 4_224],
     ),
     (
         "flash of the radio image with `guard`",
         RADIO,
         &["--no-default-features", "--features", "guard"],
-        [76 * 1024, 5_824, 4_224],
+        [76 * 1024 + 576, 5_824, 4_224],
     ),
     (
         "flash of the relay image with `auth`",
@@ -90,13 +90,13 @@ const IMAGES: &[Image] = &[
         "flash of the relay image with `guard` and `upload`",
         RELAY,
         &["--no-default-features", "--features", "guard,upload"],
-        [93 * 1024 + 512, 7_168, 5_120],
+        [94 * 1024 + 64, 7_168, 5_120],
     ),
     (
         "flash of the relay image with `guard` and `flight`",
         RELAY,
         &["--no-default-features", "--features", "guard,flight"],
-        [115 * 1024, 9_280, 4_608],
+        [115 * 1024 + 512, 9_280, 4_608],
     ),
     (
         "flash of the relay image with `mavlink-signing`",
@@ -106,7 +106,7 @@ const IMAGES: &[Image] = &[
             "--features",
             "guard,mavlink-signing",
         ],
-        [118 * 1024, 9_472, 4_608],
+        [118 * 1024 + 512, 9_472, 4_608],
     ),
     (
         "flash of the relay image, everything",
@@ -133,7 +133,7 @@ const IMAGES: &[Image] = &[
         // - departures, spares, and motions that begin and end together: 6.75 KiB flash, 280 bytes RAM
         // - endurance: 4 KiB flash of this image, 1 KiB of the others with an autopilot; 180 bytes RAM
         // - states of refused setpoints and of nodes with another mission or key in reports: 1 KiB
-        [243 * 1024, 16_640, 7_168],
+        [243 * 1024 + 512, 16_640, 7_168],
     ),
 ];
 
