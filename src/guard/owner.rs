@@ -284,7 +284,7 @@ impl FenceOwner {
 
     /// Returns true if the downstream neighbour has received the newest fence.
     pub(super) const fn is_received(&self) -> bool {
-        self.has_reply() && self.is_acknowledged
+        self.has_reply() && self.role.is_acknowledged
     }
 
     /// Returns true unless the downstream neighbour still has to answer the newest fence. It has to answer

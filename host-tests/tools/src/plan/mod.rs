@@ -431,20 +431,24 @@ impl ProfiledMission {
 
     /// Returns the plan with the relays at `places`, and the SIRs that they have in the mission.
     fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
-        let held: Vec<(Placement, Profile)> = (1..)
+        let mut held: Vec<(Placement, Profile)> = (1..)
             .zip(places)
             .map(|(index, place)| {
                 let profile = Profile {
                     altitude_m: place.altitude_m,
                     ..self.profile(index)
                 };
-                let place = Placement {
-                    x_m: place.x_m.min(self.end_m),
-                    ..*place
-                };
-                (place, profile)
+                (*place, profile)
             })
             .collect();
+        // Relays that a rounding error put beyond Rx stay in order along x.
+        let mut limit_m = self.end_m;
+        for (place, _) in held.iter_mut().rev() {
+            if place.x_m > limit_m {
+                place.x_m = limit_m;
+                limit_m = limit_m.next_down();
+            }
+        }
         let sirs = hop_sirs(&self.mission, &held);
         Plan {
             mission: self.mission,
