@@ -167,7 +167,7 @@ pub struct Settings {
     /// the last of the chain, a neighbour comes within a few metres of it.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
-    /// Number of relays that the leader keeps in the chain, as long as spares wait; 0 for a fleet without such a number.
+    /// Number of relays that the leader keeps in the chain; 0 for a fleet without such a number.
     ///
     /// While the chain has fewer relays, for example after losses, the leader calls a spare, also without a request to
     /// leave. Above half of the mission's relays, and at most all of them. Use the same value for all relays of a

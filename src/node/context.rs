@@ -408,7 +408,7 @@ pub(crate) const fn respacing(settings: &Settings) -> Duration {
     return settings.dead_after.times(0);
 }
 
-/// Returns the number of relays that the leader keeps in the chain while spares wait; 0 for no such number.
+/// Returns the number of relays that the leader keeps in the chain; 0 for no such number.
 pub(crate) const fn flying(settings: &Settings) -> u16 {
     #[cfg(feature = "departures")]
     return settings.flying;

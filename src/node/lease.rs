@@ -749,8 +749,7 @@ mod tests {
         assert_eq!(called(most_s + 20, 3), 3);
     }
 
-    /// Checks that the leader calls a spare without a request to leave if, and only if, the chain has fewer relays than
-    /// it keeps. A spare that never arrives is called no longer.
+    /// Checks that the leader calls a spare without a request to leave only if relays are too few. A spare that never arrives is called no longer.
     #[cfg(feature = "departures")]
     #[test]
     fn a_spare_is_called_while_relays_are_too_few() {

@@ -18,7 +18,7 @@ pub const NETWORK: u16 = 1;
 /// Relative tolerance of the target SIR on companion computers. No option changes it.
 pub const COMPANION_TOLERANCE: f64 = 1e-4;
 
-/// Settings of the programs: sections `[network]`, `[fleet]`, `[companion]` and `[ground]` of a scenario file.
+/// Settings of the programs, from a scenario file: `[network]`, `[fleet]`, `[companion]`, `[ground]`.
 ///
 /// If a value is `None`, the program uses its default.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]

@@ -69,7 +69,7 @@ impl Scenario {
 }
 
 impl deployment::Deployment {
-    /// Reads a scenario file: the scenario, and the settings in `[network]`, `[fleet]`, `[companion]` and `[ground]`.
+    /// Reads a scenario file: the scenario, and the settings of the programs.
     ///
     /// # Errors
     /// If [`Scenario::load`] rejects the file, if one of the three sections has a mistake, or if the numbers of relays

@@ -349,7 +349,7 @@ fn a_battery_that_does_not_outlast_its_reserve_is_refused() {
     assert!(line.contains(why), "{line}");
 }
 
-/// Checks that the leader calls a spare without a request to leave while the chain has fewer relays than `--flying`.
+/// Checks that the leader calls a spare while the chain has fewer relays than `--flying`.
 #[test]
 fn a_spare_is_called_while_the_chain_has_too_few_relays() {
     let chain = Chain::on_channel(3, Medium::new(3, QUIET));

@@ -574,7 +574,7 @@ fn a_spare_joins_first_although_hellos_are_lost() {
     }
 }
 
-/// Checks that a spare joins after the loss of a relay if the leader keeps a number of relays in the chain. The spare
+/// Checks that a spare joins after the loss of a relay if `flying` relays belong in the chain. The spare
 /// waits beside the lost relay, or far from it. Without such a number the spare is not called.
 #[test]
 fn a_spare_replaces_a_lost_relay() {

@@ -72,19 +72,19 @@ const IMAGES: &[Image] = &[
         "flash of the relay image with `guard`",
         RELAY,
         &["--no-default-features", "--features", "guard"],
-        [77 * 1024 + 256, 5_824, 4_224],
+        [77 * 1024 + 512, 5_824, 4_224],
     ),
     (
         "flash of the radio image with `guard`",
         RADIO,
         &["--no-default-features", "--features", "guard"],
-        [76 * 1024 + 576, 5_824, 4_224],
+        [76 * 1024 + 768, 5_824, 4_224],
     ),
     (
         "flash of the relay image with `auth`",
         RELAY,
         &["--no-default-features", "--features", "auth"],
-        [72 * 1024, 6_592, 3_712],
+        [72 * 1024 + 128, 6_592, 3_712],
     ),
     (
         "flash of the relay image with `guard` and `upload`",
