@@ -413,7 +413,10 @@ pub(crate) const fn flying(settings: &Settings) -> u16 {
     #[cfg(feature = "departures")]
     return settings.flying;
     #[cfg(not(feature = "departures"))]
-    return 0;
+    {
+        _ = settings;
+        0
+    }
 }
 
 /// Returns the maximum time from the leader's first message along the chain until its result returns.
