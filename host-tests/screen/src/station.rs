@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | a relay has not reported yet | notice |
 //! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`], or for one and a half times as long as it recently was, up to 10 s | critical, one for the relay |
-//! | the same without a neighbour's report, within 15 s of its last report: a relay nearer to the station is silent, too, for less than 10 s, or has returned within 5 s; or the station has [received](StationView::overhear) another frame of the relay within 5 s | none yet: the reports may have to find another way, or were lost |
+//! | the same without a neighbour's report, within 15 s of its last report: a relay nearer to the station is silent, too, for less than 10 s, or has returned within 5 s, and no later report of a relay beyond has arrived; or the station has [received](StationView::overhear) another frame of the relay within 5 s | none yet: the reports may have to find another way, or were lost |
 //! | no frame from a chain that has reported, for [`SILENT_AFTER`] | critical; it replaces the alarms about single relays |
 //! | no quorum, no feasible positions, two nodes with a relay's number | critical |
 //! | autopilot without a position, or its link lost after it was there | critical |
@@ -568,12 +568,22 @@ impl StationView {
     /// Returns true if reports of relay `number` may be missing because of a silent relay on their way.
     ///
     /// The silent relay is between relay `number` and the station. Either its silence is so short that the chain does
-    /// not bypass it yet, or it has just returned, so that reports through it may still be on their way.
+    /// not bypass it yet, or it has just returned, so that reports through it may still be on their way. False if
+    /// later reports of a relay beyond have arrived: then they pass.
     fn may_be_behind(&self, now: Instant, end: Side, number: u16) -> bool {
-        let mut nearer = self.known.values().filter(|it| match end {
-            Side::Upstream => it.report.relay < number,
-            Side::Downstream => it.report.relay > number,
-        });
+        let is_nearer = |relay: u16, of: u16| match end {
+            Side::Upstream => relay < of,
+            Side::Downstream => relay > of,
+        };
+        let mut beyond = self.shown().filter(|it| is_nearer(number, it.report.relay));
+        let newest = self.known.get(&number).map(|it| it.report.at);
+        if newest.is_some_and(|at| beyond.any(|it| it.report.at.since(at) >= SILENT_AFTER)) {
+            return false;
+        }
+        let mut nearer = self
+            .known
+            .values()
+            .filter(|it| is_nearer(it.report.relay, number));
         nearer.any(|it| {
             let is_back = |at| now.since(at) < SILENT_AFTER;
             (UNSURE_AFTER..CLOSED_AFTER).contains(&now.since(it.report.at))

@@ -441,11 +441,11 @@ impl ProfiledMission {
                 (*place, profile)
             })
             .collect();
-        // Relays that a rounding error put beyond Rx stay in order along x.
+        // Relays at Rx, or beyond it by a rounding error, stay in order along x.
         let mut limit_m = self.end_m;
         for (place, _) in held.iter_mut().rev() {
-            if place.x_m > limit_m {
-                place.x_m = limit_m;
+            place.x_m = place.x_m.min(limit_m);
+            if place.x_m >= limit_m {
                 limit_m = limit_m.next_down();
             }
         }
