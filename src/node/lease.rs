@@ -249,7 +249,8 @@ impl Lease {
     /// A relay is ordered to leave once two consecutive renewals have reported all relays in place. By then a relay
     /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
     /// it joins first, unless the view already has more relays than `Settings::flying`, or, without this number, more
-    /// than before the request to leave. A spare is called at once: while it comes, the relays may still move.
+    /// than before the request to leave. If the view has fewer than `Settings::flying`, a spare is called at once, also
+    /// while relays move.
     ///
     /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration
     /// of a motion, counted from the first agreement in this view, or from the last time that all were in place. A
@@ -295,9 +296,11 @@ impl Lease {
             flying => flying,
         };
         let joins = spare != 0 && relays < kept.saturating_add(leaves.into()) && !late;
-        if joins {
+        let settled = in_place && self.orders.in_place;
+        let is_called = self.orders.joiner != 0;
+        if joins && (settled || is_called || relays < flying(context.settings())) {
             orders.joiner = spare;
-        } else if may_leave && (late || in_place && self.orders.in_place) {
+        } else if !joins && may_leave && (late || settled) {
             orders.leaver = requests.leaver;
         }
         orders
@@ -741,7 +744,7 @@ mod tests {
             assert_eq!(lease.orders.leaver, 0, "{at_s} s");
             lease.orders.joiner
         };
-        assert_eq!([5, 10].map(|at_s| called(at_s, 3)), [3, 3]);
+        assert_eq!([5, 10].map(|at_s| called(at_s, 3)), [0, 3]);
         assert_eq!(called(15, 0), 3);
         let most_s = longest_lease(&settings).as_micros() / 1_000_000;
         assert_eq!(called(most_s, 0), 3);
