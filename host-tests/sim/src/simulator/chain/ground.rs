@@ -63,7 +63,7 @@ impl Chain {
 
     /// Returns the reports that have reached the ground station at `end` since the last call.
     ///
-    /// The second list has the relays of which the station has received frames. Of more than [`ARRIVED`] reports the newest are missing.
+    /// The second list has the relays of which the station has received frames. Of more than 64 reports the newest are missing.
     pub fn arrived(&mut self, end: Side) -> (Vec<Report>, Vec<u16>) {
         let mut stations = self.stations.iter_mut();
         let Some(station) = stations.find(|station| station.end == end) else {
