@@ -275,7 +275,8 @@ impl Steering {
             self.remind_at = None;
             if let Some(guard) = self.guard() {
                 let early = early(hop_time);
-                let times = REMINDER.as_micros() / early.as_micros();
+                // Rounded up, so that a second of the guard is not shorter than a second.
+                let times = REMINDER.as_micros().div_ceil(early.as_micros());
                 guard.remind_early(u8::try_from(times).unwrap_or(1));
                 let wait = if guard.is_waiting() {
                     early

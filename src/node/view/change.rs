@@ -541,7 +541,7 @@ pub(super) struct ViewDecision {
 /// | situation | wait before the request | set by |
 /// | --- | --- | --- |
 /// | reason for a new view, such as a changed neighbour | 250 us | `request_now` |
-/// | repetition without a result | 8, 16, then 32 hop times, at most `probe_after` | `poll_due` |
+/// | repetition without a result | 8, 16, 32 hop times, after 8 requests doubled each time; at most `probe_after` | `poll_due` |
 /// | refused view | about `probe_after`, doubled with each refusal in a row, at most three times | `request_after_refusal` |
 /// | new reason after a refusal | the rest of the first `probe_after` | `start` |
 /// | no pass along the chain since the start | `probe_after` and a round trip, or the time of a first pass if longer | `Node::await_first` |
@@ -560,6 +560,9 @@ pub(crate) struct ViewRequest {
     not_before: Option<Instant>,
     jitter: Jitter,
 }
+
+/// Number of view requests after which the time between two requests grows beyond 32 hop times.
+const EARLY: u8 = 8;
 
 /// Maximum number of doublings of the wait before a new view request, after consecutive refusals.
 const DOUBLINGS: u8 = 3;
@@ -657,9 +660,11 @@ impl ViewRequest {
 
     /// Returns the waiting time before the next view request: 8, 16, then 32 hop times.
     ///
-    /// Each relay on the way to the leader repeats the request. So longer waits would add up over the hops.
+    /// Each relay on the way to the leader repeats the request. So longer waits would add up over the hops. After
+    /// [`EARLY`] requests the time doubles again, because the next relay is probably absent.
     fn patience(&mut self, settings: &Settings) -> Duration {
-        let wait = settings.hop_time.times(8 << self.tries.min(2));
+        let doublings = self.tries.min(2) + self.tries.saturating_sub(EARLY).min(10);
+        let wait = settings.hop_time.times(8 << doublings);
         self.tries = self.tries.saturating_add(1);
         wait.min(settings.probe_after)
     }
