@@ -607,7 +607,7 @@ mod tests {
             let limit = limit(&mission, first.as_ref(), &new);
             assert_eq!(fence.is_some(), limit.is_some(), "{fence:?}, {limit:?}");
             if let (Some(line), Some(limit)) = (fence, limit) {
-                let names = forecast.is_none() || line.contains(" is relay ");
+                let names = forecast.is_none() || line.contains(": relay ");
                 assert!(
                     line.starts_with(limit) && line.contains("must be within") && names,
                     "{line}"

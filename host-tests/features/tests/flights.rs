@@ -29,9 +29,9 @@ const SAID_BY_WIRES: u32 = if cfg!(feature = "departures") {
     0xcbd4_2c1c
 };
 const SAID_ON_A_CHANNEL: u32 = if cfg!(feature = "departures") {
-    0xe24b_e4a2
+    0x4895_4941
 } else {
-    0xfb3a_1f20
+    0x42fe_1c67
 };
 
 const MINUTE: Duration = Duration::from_millis(60_000);

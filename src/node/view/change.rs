@@ -541,7 +541,7 @@ pub(super) struct ViewDecision {
 /// | situation | wait before the request | set by |
 /// | --- | --- | --- |
 /// | reason for a new view, such as a changed neighbour | 250 us | `request_now` |
-/// | repetition without a result | 8, 16, 32 hop times, after 8 requests doubled each time; at most `probe_after` | `poll_due` |
+/// | repetition without a result | 8, 16, 32 hop times, after 12 requests doubled each time; at most `probe_after` | `poll_due` |
 /// | refused view | about `probe_after`, doubled with each refusal in a row, at most three times | `request_after_refusal` |
 /// | new reason after a refusal | the rest of the first `probe_after` | `start` |
 /// | no pass along the chain since the start | `probe_after` and a round trip, or the time of a first pass if longer | `Node::await_first` |
@@ -562,7 +562,7 @@ pub(crate) struct ViewRequest {
 }
 
 /// Number of view requests after which the time between two requests grows beyond 32 hop times.
-const EARLY: u8 = 8;
+const EARLY: u8 = 12;
 
 /// Maximum number of doublings of the wait before a new view request, after consecutive refusals.
 const DOUBLINGS: u8 = 3;

@@ -513,11 +513,11 @@ fn a_request_for_a_view_is_repeated_often() {
         let at = relay.view.request.next_timeout().unwrap();
         let wait = at.since(relay.now);
         assert!(
-            wait <= most || requests > 9 && wait <= probe_after,
+            wait <= most || requests > 13 && wait <= probe_after,
             "{requests}: {wait:?}"
         );
         // A relay that may be absent is asked less often in the end.
-        assert!(requests < 14 || wait == probe_after, "{requests}: {wait:?}");
+        assert!(requests < 18 || wait == probe_after, "{requests}: {wait:?}");
         relay.now = at;
         let context = context(&relay.member, relay.latest, relay.end, relay.now);
         let effects = relay.view.handle_timeout(&context, false, false);
