@@ -170,8 +170,9 @@ pub struct Settings {
     /// Number of relays that the leader keeps in the chain; 0 for a fleet without such a number.
     ///
     /// While the chain has fewer relays, for example after losses, the leader calls a spare, also without a request to
-    /// leave. Above half of the mission's relays, and at most all of them. Use the same value for all relays of a
-    /// chain, because each of them may become the leader.
+    /// leave. With a guard, it calls none beside a lost drone that has not been reported as gone. Above half of the
+    /// mission's relays, and at most all of them. Use the same value for all relays of a chain, because each of them may
+    /// become the leader.
     #[cfg(feature = "departures")]
     pub flying: u16,
     /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded

@@ -134,6 +134,8 @@ pub struct Guard {
     disorder: bool,
     /// Number of successive reminders (calls of `remind`, one per second) with an unknown order along x.
     unordered: u8,
+    /// Number of successive reminders (calls of `remind`, one per second) while this relay waits for a message.
+    waited: u8,
     /// Quarters of a second that reminders have counted.
     reminders: u8,
     refused: u32,
@@ -142,7 +144,7 @@ pub struct Guard {
 /// Quarters of a second between two messages of a relay that hovers without flying to setpoints.
 const UNFLOWN_EVERY: u8 = 16;
 
-/// Number of seconds with an unknown order along x after which messages are no longer repeated early.
+/// Number of seconds of waiting for a neighbour's message after which messages are no longer repeated early.
 const MAX_EARLY: u8 = 30;
 
 /// Number of seconds after which an unknown order along x halts the chain.
@@ -163,6 +165,7 @@ impl Guard {
             owner: FenceOwner::new(downstream, &mut jitter),
             disorder: false,
             unordered: 0,
+            waited: 0,
             reminders: 0,
             jitter,
             started_at: now,
@@ -293,9 +296,11 @@ impl Guard {
         match side {
             Side::Upstream if self.follower.association.node != node => {
                 self.follower.link(node, &self.own, &mut self.jitter);
+                self.waited = 0;
             }
             Side::Downstream if self.owner.association.node != node => {
                 self.owner.link(node, &self.own, &mut self.jitter);
+                self.waited = 0;
             }
             _ => {}
         }
@@ -512,6 +517,11 @@ impl Guard {
             0
         };
         self.disorder |= self.unordered >= MAX_UNORDERED && !self.is_seen_in_order();
+        self.waited = if self.awaits() == [false; 2] {
+            0
+        } else {
+            self.waited.saturating_add(1)
+        };
         let arrived = self.has_arrived();
         let follower =
             self.follower.association.node != 0 && !(arrived && self.follower.has_fence());
@@ -529,12 +539,12 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns the sides at which this relay waits for a message of its neighbour. None after a long wait.
+    /// Returns the sides at which this relay waits for a message of its neighbour.
     ///
     /// The message is the first fence of the neighbour toward Tx, or the answer to this relay's newest fence.
     #[inline(never)] // called from several places
     fn awaits(&self) -> [bool; 2] {
-        let begun = self.own.setpoint.is_some() && self.unordered < MAX_EARLY;
+        let begun = self.own.setpoint.is_some();
         let (up, down) = (&self.follower.association, &self.owner.association);
         [
             begun && !up.has_no_flown_neighbour() && !self.follower.has_fence(),
@@ -542,9 +552,9 @@ impl Guard {
         ]
     }
 
-    /// Returns true if this relay waits for a message of a neighbour.
+    /// Returns true if this relay waits for a message of a neighbour, but not after a long wait.
     pub fn is_waiting(&self) -> bool {
-        self.awaits() != [false; 2]
+        self.waited < MAX_EARLY && self.awaits() != [false; 2]
     }
 
     /// Restarts the second that ends with the next [`remind`](Self::remind).

@@ -559,6 +559,24 @@ fn a_relay_that_waits_repeats_its_messages_early() {
     }
 }
 
+/// Checks that a relay whose fence is never answered repeats it early for a limited time, also in a known order.
+#[test]
+fn a_relay_that_waits_in_vain_repeats_its_messages_less_often() {
+    let mut pair = Pair::new([100.0, 120.0], [300.0, 300.0]);
+    for _ in 0..4 {
+        pair.talk();
+    }
+    // From now on the neighbour is silent.
+    pair.owner.guard.set_goal(at(150.0));
+    let seconds = (0..100).take_while(|_| {
+        while pair.owner.guard.poll().is_some() {}
+        pair.owner.guard.remind();
+        pair.owner.guard.is_waiting()
+    });
+    let waited = seconds.count();
+    assert!((20..=30).contains(&waited), "{waited} s");
+}
+
 /// Checks rules 3, 4 and 6 of the guard for moves toward Rx. Relay 1 advances only as far as relay 2 has moved.
 #[test]
 fn the_owner_follows_the_follower() {
