@@ -24,6 +24,8 @@
 //! Every line of the page must occur in the output, in order, with other lines in between. Trailing spaces are
 //! ignored. A line `...` matches any lines. In a block `text noisy` each number matches any number.
 //!
+//! `--write` replaces each line that is not printed with the most similar line of the output.
+//!
 //! The commands of `.cargo/config.toml` are built beforehand, so no block waits for the compiler.
 
 mod page;
@@ -65,12 +67,14 @@ struct Options {
     /// Run only the slow commands of the pages
     #[arg(long)]
     slow: bool,
+    /// Replace each line that is not printed with the most similar line of the output
+    #[arg(long)]
+    write: bool,
 }
 
 fn main() -> ExitCode {
-    let Options { only, slow } = Options::parse();
-    let root = Path::new(".");
-    match walk(root, &only, slow) {
+    let options = Options::parse();
+    match walk(Path::new("."), &options) {
         Ok(0) => ExitCode::SUCCESS,
         Ok(faults) => {
             println!("pages: the output of {faults} blocks differs from the page");
@@ -86,15 +90,24 @@ fn main() -> ExitCode {
 /// Runs the commands of all pages whose name contains `only`; returns the number of faulty blocks.
 ///
 /// A block is faulty if a command fails or its output differs from the page. If `slow` is true, only blocks marked as
-/// slow are run; otherwise only those not marked.
-fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
+/// slow are run; otherwise only those not marked. If `write` is true, the pages are corrected.
+fn walk(root: &Path, options: &Options) -> Result<usize, String> {
+    let &Options {
+        ref only,
+        slow,
+        write,
+    } = options;
     let shell = page::Shell::build(root)?;
     let (mut faults, mut run, mut left_out, mut checked) = (0, 0, 0, 0);
-    for name in PAGES.into_iter().filter(|name| name.contains(only)) {
+    for name in PAGES
+        .into_iter()
+        .filter(|name| name.contains(only.as_str()))
+    {
         let text =
             std::fs::read_to_string(root.join(name)).map_err(|error| format!("{name}: {error}"))?;
         let blocks = page::blocks(&text).map_err(|error| format!("{name}:{error}"))?;
         shell.clean()?;
+        let mut corrected = text.clone();
         for (at, block) in blocks.iter().enumerate() {
             let Kind::Commands(why_not) = &block.kind else {
                 continue;
@@ -123,16 +136,32 @@ fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
             let output = shell.run(&block.commands(), slow);
             let seconds = begun.elapsed().as_secs_f64();
             println!("{name}:{}: {seconds:.1} s", block.line);
-            let fault = output.and_then(|output| {
+            let found = output.map(|output| {
                 let quoted = blocks.get(at + 1).filter(|next| next.prints(block));
-                let said = |block: &Block| page::compare(&block.printed(), &output, block.noisy);
-                said(block)?;
-                quoted.map_or(Ok(()), said)
+                let said =
+                    |block: &Block| page::differences(&block.printed(), &output, block.noisy);
+                let mut found = said(block);
+                found.extend(quoted.map(said).unwrap_or_default());
+                found
             });
-            if let Err(fault) = fault {
-                faults += 1;
-                println!("{name}:{}: {fault}", block.line);
+            match found {
+                Ok(found) if found.is_empty() => {}
+                Ok(found) => {
+                    faults += 1;
+                    for difference in &found {
+                        println!("{name}:{}: {difference}", block.line);
+                        corrected = page::corrected(&corrected, block.line, difference);
+                    }
+                }
+                Err(fault) => {
+                    faults += 1;
+                    println!("{name}:{}: {fault}", block.line);
+                }
             }
+        }
+        if write && corrected != text {
+            std::fs::write(root.join(name), corrected)
+                .map_err(|error| format!("{name}: {error}"))?;
         }
     }
     println!(

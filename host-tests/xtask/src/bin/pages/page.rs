@@ -1,6 +1,7 @@
 //! Code blocks of a page: parsing, running and comparison.
 
-use std::fmt::Write as _;
+use std::cmp::Reverse;
+use std::fmt::{self, Write as _};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
@@ -145,7 +146,7 @@ pub(crate) struct Shell {
 
 impl Shell {
     pub(crate) fn build(root: &Path) -> Result<Self, String> {
-        let failed = |what: &str, error: &dyn std::fmt::Display| format!("{what}: {error}");
+        let failed = |what: &str, error: &dyn fmt::Display| format!("{what}: {error}");
         // With all targets, so that the features of the dependencies, and so the builds, are those of the tests.
         let status = Command::new("cargo")
             .args(["build", "--quiet", "--locked", "--workspace"])
@@ -258,13 +259,27 @@ fn functions(config: &str, bin: &Path, root: &Path) -> String {
     )
 }
 
-/// Checks that the lines of the page occur in the output, in order, with other lines in between.
+/// Line of a page that is not in the output.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Difference {
+    /// Line of the page.
+    pub line: String,
+    /// Most similar line of the output after the lines found before; empty if there is none.
+    pub like: String,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { line, like } = self;
+        write!(f, "is not printed: {line}\n  most like it is: {like}")
+    }
+}
+
+/// Returns the lines of the page that do not occur in the output, in order, with other lines in between.
 ///
-/// If `noisy` is true, each number matches any number.
-///
-/// # Errors
-/// The first missing line, and the most similar line of the output.
-pub(crate) fn compare(page: &[&str], output: &str, noisy: bool) -> Result<(), String> {
+/// If `noisy` is true, each number matches any number. After a line that does not occur, the search goes on after the
+/// most similar line.
+pub(crate) fn differences(page: &[&str], output: &str, noisy: bool) -> Vec<Difference> {
     let read = |line: &str| {
         if noisy {
             unnumbered(line)
@@ -272,6 +287,7 @@ pub(crate) fn compare(page: &[&str], output: &str, noisy: bool) -> Result<(), St
             line.trim_end().to_owned()
         }
     };
+    let mut found = Vec::new();
     let mut left = output.lines();
     for line in page.iter().filter(|line| line.trim() != "...") {
         let wanted = read(line);
@@ -279,15 +295,36 @@ pub(crate) fn compare(page: &[&str], output: &str, noisy: bool) -> Result<(), St
             continue;
         }
         let rest = left.clone();
-        if !left.any(|printed| read(printed) == wanted) {
-            let like = rest.max_by_key(|printed| alike(&read(printed), &wanted));
-            return Err(format!(
-                "is not printed: {line}\n  most like it is: {}",
-                like.unwrap_or_default()
-            ));
+        if left.any(|printed| read(printed) == wanted) {
+            continue;
         }
+        // The first of the most similar lines.
+        let similar = rest.clone().enumerate();
+        let like =
+            similar.max_by_key(|(at, printed)| (alike(&read(printed), &wanted), Reverse(*at)));
+        left = rest;
+        if let Some((at, _)) = like {
+            left.nth(at);
+        }
+        found.push(Difference {
+            line: (*line).to_owned(),
+            like: like.map_or(String::new(), |(_, line)| line.trim_end().to_owned()),
+        });
     }
-    Ok(())
+    found
+}
+
+/// Returns the page `text` with the first equal line after line `from` replaced by the similar line of the output.
+pub(crate) fn corrected(text: &str, from: usize, difference: &Difference) -> String {
+    let mut lines: Vec<&str> = text.split('\n').collect();
+    let after = lines.iter_mut().skip(from);
+    let mut equal = after.filter(|line| **line == difference.line);
+    if let Some(line) = equal.next()
+        && !difference.like.is_empty()
+    {
+        *line = &difference.like;
+    }
+    lines.join("\n")
 }
 
 /// Replaces each number in a line with `#`, and each run of spaces with one space.
@@ -316,7 +353,7 @@ fn alike(one: &str, other: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{Kind, blocks, compare, functions};
+    use super::{Difference, Kind, blocks, corrected, differences, functions};
 
     const PAGE: &str = "# One\n\n```sh\na \\\n  b\n```\n\nprints\n\n```text\n1 s\n```\n\n## Two\n\n```text\nx\n```\n\n```console root\n$ c\nd\n```\n";
 
@@ -368,7 +405,7 @@ mod tests {
     fn lines_keep_their_order_and_only_noisy_numbers_vary() {
         let good: [&[&str]; 3] = [&["other"], &["  0.10 s  one", "...", " 12.5 s  two"], &[]];
         for page in good {
-            assert_eq!(compare(page, OUTPUT, false), Ok(()));
+            assert_eq!(differences(page, OUTPUT, false), []);
         }
         let bad: [&[&str]; 3] = [
             &["  0.11 s  one"],
@@ -376,16 +413,29 @@ mod tests {
             &["other", "other"],
         ];
         for page in bad {
-            assert!(compare(page, OUTPUT, false).is_err(), "{page:?}");
+            assert_eq!(differences(page, OUTPUT, false).len(), 1, "{page:?}");
         }
-        assert!(compare(&[" 9.99 s  one", " 3 s  three"], OUTPUT, true).is_err());
+        let noisy = |page: &[&str]| differences(page, OUTPUT, true).len();
+        assert_eq!(noisy(&[" 9.99 s  one", " 3 s  three"]), 1);
+        assert_eq!(noisy(&[" 9.99 s  one", " 3 s  two"]), 0);
+    }
+
+    #[test]
+    fn each_difference_has_the_most_similar_line() {
+        let page = ["  0.11 s  one", "other", "13 s  two"];
+        let like = |line: &str, like: &str| Difference {
+            line: line.to_owned(),
+            like: like.to_owned(),
+        };
         assert_eq!(
-            compare(&[" 9.99 s  one", " 3 s  two"], OUTPUT, true),
-            Ok(())
+            differences(&page, OUTPUT, false),
+            [
+                like(page[0], "  0.10 s  one"),
+                like(page[2], " 12.5 s  two")
+            ]
         );
-        let error = compare(&["13 s  two"], OUTPUT, false)
-            .err()
-            .unwrap_or_default();
-        assert!(error.ends_with(" 12.5 s  two"), "{error}");
+        assert_eq!(differences(&["a"], "", false), [like("a", "")]);
+        assert_eq!(corrected("a\nb\na\n", 1, &like("a", "c")), "a\nb\nc\n");
+        assert_eq!(corrected("a\n", 0, &like("a", "")), "a\n");
     }
 }
