@@ -55,6 +55,8 @@ pub(super) struct Layout {
     pub(super) reverse: F32,
     pub(super) rx_power_w: F32,
     pub(super) fitted_gap: F32,
+    pub(super) flying: U16,
+    pub(super) spare: U16,
     pub(super) crc: U32,
 }
 
@@ -117,6 +119,16 @@ impl Layout {
             (0, 0) if is_zero(&[self.relative_error]) => Ok(None),
             _ if listen.is_valid() && self.points == 0 => Ok(Some(listen)),
             _ => Err(ConfigError::Listen),
+        }
+    }
+
+    /// Returns the number of relays kept in the chain, 0 for none, and true if this relay starts as a spare.
+    pub(super) fn fleet(&self) -> Result<(u16, bool), ConfigError> {
+        let (relays, flying) = (self.relays.get(), self.flying.get());
+        match self.spare.get() {
+            0 if flying == 0 => Ok((0, false)),
+            spare @ 0..=1 if flying > relays / 2 && flying <= relays => Ok((flying, spare == 1)),
+            _ => Err(ConfigError::Fleet),
         }
     }
 
