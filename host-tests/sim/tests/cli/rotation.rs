@@ -34,7 +34,7 @@ fn a_fleet_of_twelve_replaces_its_tired_drones() {
 #[test]
 fn a_scenario_says_how_many_relays_fly() {
     let file = tempfile::NamedTempFile::new().unwrap();
-    let text = include_str!("../../../../examples/scenario.toml");
+    let text = uav_relay_scenario::DEFAULT;
     let sections = "\n[network]\nrelays = 3\n[fleet]\nflying = 2\n";
     std::fs::write(file.path(), format!("{text}{sections}")).unwrap();
     let path = file.path().display();
