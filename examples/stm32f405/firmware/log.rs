@@ -262,14 +262,8 @@ pub(crate) fn refused(error: ConfigError) {
                 "configuration refused: an autopilot's key needs sites (positions of Tx and Rx)"
             );
         }
-        ConfigError::Silence => {
-            error!("configuration refused: probe_after_ms must be at most 1200000");
-        }
-        ConfigError::Fleet => {
-            error!(
-                "configuration refused: flying must be above half of the relays and at most all"
-            );
-        }
+        ConfigError::Silence => error!("configuration refused: probe_after_ms above 1200000"),
+        ConfigError::Fleet => error!("configuration refused: flying must exceed half the relays"),
         ConfigError::Field(error) => error!("configuration refused: interference field: {}", error),
         ConfigError::Channel(error) => error!("configuration refused: channel: {}", error),
         ConfigError::Mission(error) => error!("configuration refused: mission: {}", error),

@@ -15,8 +15,8 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Placement, Sites};
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
-    Alarm, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine, Node,
-    Position, RelaySnapshot, Screen, Snapshot, Task, Tiles, Urgency,
+    Alarm, ChainSize, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine,
+    Node, Position, RelaySnapshot, Screen, Snapshot, Task, Tiles, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
