@@ -122,16 +122,6 @@ impl Layout {
         }
     }
 
-    /// Returns the number of relays kept in the chain, 0 for none, and true if this relay starts as a spare.
-    pub(super) fn fleet(&self) -> Result<(u16, bool), ConfigError> {
-        let (relays, flying) = (self.relays.get(), self.flying.get());
-        match self.spare.get() {
-            0 if flying == 0 => Ok((0, false)),
-            spare @ 0..=1 if flying > relays / 2 && flying <= relays => Ok((flying, spare == 1)),
-            _ => Err(ConfigError::Fleet),
-        }
-    }
-
     /// Returns the Tx and Rx positions and the drone's speed limit. `None` if all these numbers are 0, which means no
     /// autopilot.
     pub(super) fn sites(&self) -> Result<Option<Sites>, ConfigError> {

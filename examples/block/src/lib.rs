@@ -58,7 +58,7 @@
 //! | 380 | f32 | power of the receiver on the way back, W; without effect if the number before is 0 |
 //! | 384 | f32 | SNR gap of fitted slots, linear: 1 to 1000, with method 1 and without sensing; 0 for equal slots |
 //! | 388 | u16 | relays that the leader keeps in the chain, above N / 2 and to N; 0 without spares |
-//! | 390 | u16 | 1 if this relay waits outside of the chain as a spare at its start, else 0; must be 0 if the number before is 0 |
+//! | 390 | u16 | 1 if this relay waits outside of the chain as a spare at its start, else 0 |
 //! | 392 | u32 | CRC-32C of bytes 0 to 391 |
 //!
 //! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by
@@ -130,8 +130,9 @@ pub const EMPTY: FieldStorage = [FieldPoint {
 
 /// Reads and checks a configuration block. The interference points, if any, are copied to `storage`.
 ///
-/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions. The relay rejects the
-/// joint method for more than 100 relays, and a feature that its build lacks.
+/// The bytes may be arbitrary. A relay accepts every returned configuration, with three exceptions. The relay rejects
+/// the joint method for more than 100 relays, a feature that its build lacks, and a number [`Config::flying`] out of
+/// range.
 ///
 /// # Errors
 /// [`ConfigError`] names the fault, or the number that is out of range.
@@ -159,7 +160,6 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
     if sites.is_none() && autopilot_key(block).is_some() {
         return Err(ConfigError::AutopilotKey);
     }
-    let (flying, spare) = raw.fleet()?;
     let probe_after_ms = raw.probe_after_ms.get();
     if probe_after_ms > MAX_PROBE_AFTER_MS {
         return Err(ConfigError::Silence);
@@ -198,6 +198,9 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
     if raw.hold_altitude > 1 {
         return Err(ConfigError::Hold);
     }
+    if raw.spare.get() > 1 {
+        return Err(ConfigError::Spare);
+    }
     if method != Method::Align && raw.points > 0 {
         return Err(ConfigError::Method);
     }
@@ -222,8 +225,8 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
         listen,
         sites,
         probe_after_ms,
-        flying,
-        spare,
+        flying: raw.flying.get(),
+        spare: raw.spare.get() == 1,
     })
 }
 

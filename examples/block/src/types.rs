@@ -176,8 +176,8 @@ pub enum ConfigError {
     AutopilotKey,
     /// `probe_after_ms` exceeds its maximum.
     Silence,
-    /// The number of relays kept in the chain is out of range, or the relay is a spare without such a number.
-    Fleet,
+    /// The mark of a spare is neither 0 nor 1.
+    Spare,
     /// An interference point is out of range.
     Field(FieldError),
     /// A parameter of the channel is out of range.

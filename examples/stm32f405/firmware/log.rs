@@ -263,7 +263,7 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Silence => error!("configuration refused: probe_after_ms above 1200000"),
-        ConfigError::Fleet => error!("configuration refused: flying must exceed half the relays"),
+        ConfigError::Spare => error!("configuration refused: spare must be 0 or 1"),
         ConfigError::Field(error) => error!("configuration refused: interference field: {}", error),
         ConfigError::Channel(error) => error!("configuration refused: channel: {}", error),
         ConfigError::Mission(error) => error!("configuration refused: mission: {}", error),

@@ -68,9 +68,6 @@ impl fmt::Display for BlockError {
             Self::Config(ConfigError::Speed) => {
                 f.write_str("the maximum speed must be within 0.1 to 20 m/s, and needs a scenario with a [site]")
             }
-            Self::Config(ConfigError::Fleet) => f.write_str(
-                "the number of relays that fly must be above half of all relays, and at most all",
-            ),
             Self::Config(ConfigError::AutopilotKey) => {
                 f.write_str("an autopilot's key needs a scenario with a [site]")
             }

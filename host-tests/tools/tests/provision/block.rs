@@ -321,11 +321,7 @@ fn a_number_out_of_range_is_named() {
         (352, &[1], ConfigError::Listen),
         (360, &[1], ConfigError::Listen),
         (368, &0.1_f32.to_le_bytes(), ConfigError::Listen),
-        // Numbers of a fleet of five relays.
-        (388, &[2, 0], ConfigError::Fleet),
-        (388, &[6, 0], ConfigError::Fleet),
-        (388, &[3, 0, 2, 0], ConfigError::Fleet),
-        (390, &[1, 0], ConfigError::Fleet),
+        (390, &[2, 0], ConfigError::Spare),
         // Values of a block without sites.
         (312, &1.0_f32.to_le_bytes(), ConfigError::Speed),
         (312, &(-0.0_f32).to_le_bytes(), ConfigError::Speed),
