@@ -342,7 +342,8 @@ pub enum SetupError {
     Guard,
     /// `respacing` is longer than four times `dead_after`.
     Respacing,
-    /// `flying` is above 0, but not within more than half of the mission's relays and all of them.
+    /// `flying` is above 0, but not within more than half of the mission's relays and all of them. Or a firmware has such
+    /// a number, and the crate was built without the feature `departures`.
     Flying,
 }
 
@@ -362,7 +363,7 @@ error_texts!(SetupError {
     WithoutQuorum => "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4",
     Guard => "guard: geofence limits must be within -1e7 to 1e7 m, each lower limit at most its upper limit; separation_m within 0 to 1e5, relays within 1 to 1000, hover_m (position error of a hovering drone) within 0 to 1e3; guard needs the cargo feature `guard`",
     Respacing => "respacing (duration of the motion to new positions) must be at most four times dead_after",
-    Flying => "flying (number of relays kept in the chain) must be 0, or above half of the mission's relays and at most all of them",
+    Flying => "flying (number of relays kept in the chain) must be 0, or above half of the mission's relays and at most all of them; flying needs the cargo feature `departures`",
 });
 
 pub(crate) fn check(

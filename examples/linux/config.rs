@@ -427,6 +427,20 @@ fn without_separation(scenario: &Scenario) -> Scenario {
     }
 }
 
+/// Checks `--flying`, the number of relays that are meant to fly, of a fleet of `of` relays.
+///
+/// # Errors
+/// The option with its value and range.
+pub fn check_flying(flying: Option<u16>, of: u16) -> Result<(), String> {
+    let least = of / 2 + 1;
+    let wrong = flying.filter(|flying| !(least..=of).contains(flying));
+    wrong.map_or(Ok(()), |flying| {
+        Err(format!(
+            "--flying {flying}: must be within {least} to {of}, more than half of --of"
+        ))
+    })
+}
+
 /// Adds the options of the file's `[network]` section, which every program reads.
 pub fn network(deployment: &Deployment, given: &mut FileOptions) {
     let network = &deployment.network;

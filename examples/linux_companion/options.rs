@@ -11,6 +11,7 @@ use uav_relay::{
 };
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::endpoint::{Endpoint, FORM};
+use uav_relay_scenario::fleet::FleetSize;
 use uav_relay_scenario::key;
 
 use crate::autopilot::{AutopilotPlan, AutopilotPort, SigningKey};
@@ -213,8 +214,9 @@ pub(crate) struct BatteryOptions {
     #[arg(long, requires = "shared")]
     pub(crate) spare: bool,
     /// Number of relays that the leader keeps in the chain: more than half of --of, at most all. While there are fewer,
-    /// it calls spares. Without this option a spare is called only before a departure. The same for all relays
-    #[arg(long, value_name = "N", requires = "shared", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
+    /// it calls spares. Without this option a spare is called only before a departure. The same for all relays; only with
+    /// --shared
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     flying: Option<u16>,
     /// Duration of the motion to newly agreed positions, s, 0 to 3600, at most four times --dead-after-ms. All drones
     /// begin and arrive together, so that no hop is worse on the way. The same for all relays
@@ -234,12 +236,7 @@ impl BatteryOptions {
 
     /// Checks the options of a fleet of `of` relays: `--flying` and `--respacing`.
     fn check_fleet(&self, dead_after_ms: u64, of: u16) -> Result<(), String> {
-        let least = of / 2 + 1;
-        if let Some(flying) = self.flying.filter(|flying| !(least..=of).contains(flying)) {
-            return Err(format!(
-                "--flying {flying}: must be within {least} to {of}, more than half of --of"
-            ));
-        }
+        config::check_flying(self.flying, of)?;
         let most_ms = dead_after_ms.saturating_mul(4);
         if micros(self.respacing) > Duration::from_millis(most_ms) {
             return Err(format!(
@@ -396,6 +393,9 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
     };
     let key = options.key_file.as_deref();
     let key = key.map(|file| key::load("--key-file", file));
+    let flying = options.battery.flying.unwrap_or(of);
+    let rank = FleetSize { relays: of, flying }.rank(index);
+    let rank = rank.filter(|_| !options.battery.spare);
     Ok(Plan {
         mission,
         identity: Identity {
@@ -405,7 +405,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         settings,
         key: key.transpose()?.map(SigningKey),
         autopilot: autopilot(&options)?,
-        planned: file_only.places.get(usize::from(index) - 1).copied(),
+        planned: rank.and_then(|rank| file_only.places.get(rank).copied()),
         overrides: file_only.overrides,
         options,
     })
@@ -459,6 +459,11 @@ fn wiring(options: &Options) -> Result<Wiring, String> {
         return Err(format!(
             "--shared {}: cannot be combined with --upstream and --downstream",
             tty.display()
+        ));
+    }
+    if let Some(flying) = options.battery.flying {
+        return Err(format!(
+            "--flying {flying}: needs --shared, because spares join only on a radio channel that all relays share; on wires leave --flying out, and fleet.flying of the --config file"
         ));
     }
     let missing = |name: &str, neighbour: u16| {

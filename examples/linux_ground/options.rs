@@ -65,6 +65,10 @@ pub(crate) struct Options {
     /// Number of relays, 1 to 1000
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     of: u16,
+    /// Number of relays that are meant to fly, more than half of --of, at most all. The page shows it beside the number of relays in
+    /// the chain, and warns after 30 s with fewer relays. By default all relays of the chain count, and there is no warning
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
+    pub(crate) flying: Option<u16>,
     #[command(flatten)]
     loaded: MissionOptions,
     #[command(flatten)]
@@ -180,6 +184,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.ground;
+    given.value("--flying", deployment.fleet.flying);
     given.path("--tty", own.tty.as_ref());
     given.flag("--shared", own.shared);
     given.value("--end", own.end.as_ref());
@@ -201,6 +206,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
+    config::check_flying(options.flying, options.of)?;
     let interference = options.loaded.interference(file_only.field);
     let base = options
         .loaded

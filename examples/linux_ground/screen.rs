@@ -142,6 +142,7 @@ impl Web {
             },
             end: plan.end,
             relays: loaded.relays(),
+            flying: plan.options.flying,
             profiles: &plan.loaded.profiles,
             is_estimated: false,
             axis: axis.as_ref(),

@@ -55,6 +55,8 @@ pub(super) struct Layout {
     pub(super) reverse: F32,
     pub(super) rx_power_w: F32,
     pub(super) fitted_gap: F32,
+    pub(super) flying: U16,
+    pub(super) spare: U16,
     pub(super) crc: U32,
 }
 

@@ -57,7 +57,9 @@
 //! | 376 | f32 | SIR needed on the way back from Rx to Tx, relative to that on the way there: 0 (one direction) to 1 |
 //! | 380 | f32 | power of the receiver on the way back, W; without effect if the number before is 0 |
 //! | 384 | f32 | SNR gap of fitted slots, linear: 1 to 1000, with method 1 and without sensing; 0 for equal slots |
-//! | 388 | u32 | CRC-32C of bytes 0 to 387 |
+//! | 388 | u16 | relays that the leader keeps in the chain, above N / 2 and to N; 0 without spares |
+//! | 390 | u16 | 1 if this relay waits outside of the chain as a spare at its start, else 0 |
+//! | 392 | u32 | CRC-32C of bytes 0 to 391 |
 //!
 //! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by
 //! `course.rs`, `Axis`.
@@ -97,10 +99,10 @@ pub const BAUD: u32 = 115_200;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// Version of the configuration block's format.
-pub const VERSION: u16 = 11;
+pub const VERSION: u16 = 12;
 
 /// Length of a configuration block, bytes.
-pub const LEN: usize = 392;
+pub const LEN: usize = 396;
 
 /// Maximum number of interference points in a configuration block.
 pub const MAX_POINTS: usize = 16;
@@ -112,7 +114,7 @@ const CHECKED: usize = LEN - 4;
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
-const LEN_FIELD: u16 = 392;
+const LEN_FIELD: u16 = 396;
 
 /// Configuration block as stored in flash.
 pub type Block = [u8; LEN];
@@ -128,8 +130,9 @@ pub const EMPTY: FieldStorage = [FieldPoint {
 
 /// Reads and checks a configuration block. The interference points, if any, are copied to `storage`.
 ///
-/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions. The relay rejects the
-/// joint method for more than 100 relays, and a feature that its build lacks.
+/// The bytes may be arbitrary. A relay accepts every returned configuration, with three exceptions. The relay rejects
+/// the joint method for more than 100 relays, a feature that its build lacks, and a number [`Config::flying`] out of
+/// range.
 ///
 /// # Errors
 /// [`ConfigError`] names the fault, or the number that is out of range.
@@ -195,6 +198,9 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
     if raw.hold_altitude > 1 {
         return Err(ConfigError::Hold);
     }
+    if raw.spare.get() > 1 {
+        return Err(ConfigError::Spare);
+    }
     if method != Method::Align && raw.points > 0 {
         return Err(ConfigError::Method);
     }
@@ -219,6 +225,8 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
         listen,
         sites,
         probe_after_ms,
+        flying: raw.flying.get(),
+        spare: raw.spare.get() == 1,
     })
 }
 

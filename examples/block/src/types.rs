@@ -35,10 +35,15 @@ pub struct Config {
     pub sites: Option<Sites>,
     /// Silence after which a neighbour is asked for a heartbeat, ms; 0 for the default, 5 s.
     pub probe_after_ms: u32,
+    /// Number of relays that the leader keeps in the chain; 0 for a fleet without spares. For an image with the feature
+    /// `departures`: `Settings::flying`.
+    pub flying: u16,
+    /// True if this relay waits outside of the chain as a spare at its start: `Relay::wait_as_spare`.
+    pub spare: bool,
 }
 
 impl Config {
-    /// Returns the relay's settings, without signing key and guard (collision avoidance).
+    /// Returns the relay's settings, without signing key, guard (collision avoidance) and [`Self::flying`].
     pub fn settings(&self, wiring: Wiring) -> Settings {
         let common = self.mission.config().common;
         let preset = match wiring {
@@ -171,6 +176,8 @@ pub enum ConfigError {
     AutopilotKey,
     /// `probe_after_ms` exceeds its maximum.
     Silence,
+    /// The mark of a spare is neither 0 nor 1.
+    Spare,
     /// An interference point is out of range.
     Field(FieldError),
     /// A parameter of the channel is out of range.

@@ -68,6 +68,8 @@ pub fn write(
         fitted_gap: mission.fitted_gap.into(),
         autopilot_key: autopilot_key.unwrap_or_default(),
         probe_after_ms: config.probe_after_ms.into(),
+        flying: config.flying.into(),
+        spare: u16::from(config.spare).into(),
         ..Layout::new_zeroed()
     };
     for (place, point) in block.field.iter_mut().zip(points) {

@@ -410,7 +410,7 @@ impl Drone {
             let along_m = x_m.clamp(0.0, self.axis.distance_m());
             let beyond_m = (x_m - along_m).hypot(place.y_m.into());
             let text = format!(
-                "the drone is {beyond_m:.0} m from the line from Tx to Rx; its planned position is unknown, because the file has no [plan]"
+                "the drone is {beyond_m:.0} m from the line from Tx to Rx; its planned position is unknown, because the file has no [plan], or this relay is a spare"
             );
             return if beyond_m <= f64::from(self.within_m) {
                 Ok(text)

@@ -4,6 +4,8 @@ use uav_relay::Auth;
 use uav_relay::GuardConfig;
 #[cfg(feature = "auth")]
 use uav_relay::Key;
+#[cfg(not(feature = "departures"))]
+use uav_relay::SetupError;
 use uav_relay::{Instant, Relay, Settings, Wiring};
 #[cfg(feature = "auth")]
 use uav_relay_kept::{epoch, journal::Journal};
@@ -42,6 +44,11 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
                 persistent::resume_upload(relay);
             }
             let views = cortex_m::singleton!(VIEWS: persistent::Views = persistent::Views::resume(relay, now))?;
+            // After the votes are loaded, as `wait_as_spare` requires.
+            #[cfg(feature = "departures")]
+            if config.spare {
+                relay.wait_as_spare(now);
+            }
             Some(Drone {
                 relay,
                 views,
@@ -66,8 +73,15 @@ fn switch_on(
     wiring: Wiring,
     now: Instant,
 ) -> Option<&'static mut Relay> {
+    #[cfg(not(feature = "departures"))]
+    if config.flying > 0 {
+        log::cannot_fly(SetupError::Flying);
+        return None;
+    }
     let settings = Settings {
         auth,
+        #[cfg(feature = "departures")]
+        flying: config.flying,
         guard: config.sites.as_ref().and_then(|sites| {
             Autopilot::guard(sites, GuardConfig::of(&config.mission, config.profile))
         }),

@@ -262,9 +262,8 @@ pub(crate) fn refused(error: ConfigError) {
                 "configuration refused: an autopilot's key needs sites (positions of Tx and Rx)"
             );
         }
-        ConfigError::Silence => {
-            error!("configuration refused: probe_after_ms must be at most 1200000");
-        }
+        ConfigError::Silence => error!("configuration refused: probe_after_ms above 1200000"),
+        ConfigError::Spare => error!("configuration refused: spare must be 0 or 1"),
         ConfigError::Field(error) => error!("configuration refused: interference field: {}", error),
         ConfigError::Channel(error) => error!("configuration refused: channel: {}", error),
         ConfigError::Mission(error) => error!("configuration refused: mission: {}", error),

@@ -29,6 +29,8 @@ const GAP: f64 = 5.0;
 pub struct Loaded {
     /// Mission loaded before flight, with all parameters.
     pub mission: Mission,
+    /// Number of relays that are meant to fly: `fleet.flying` of the scenario.
+    pub flying: Option<u16>,
     /// Profiles (altitude and power) of single relays, with the relay's number.
     pub profiles: Vec<(u16, Profile)>,
     /// Line on earth from Tx to Rx, if the scenario has one.
@@ -145,6 +147,7 @@ impl Flight {
             duration,
             period,
             relays,
+            flying: self.loaded.and_then(|it| it.flying),
             ..Self::default()
         };
         let reports = reports(frames, begin, relays);

@@ -68,10 +68,14 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
             let name = file.display();
             let loaded =
                 loaded(&scenario, relays, digest).map_err(|why| format!("{name}: {why}"))?;
-            Some(loaded.ok_or_else(|| {
+            let loaded = loaded.ok_or_else(|| {
                 let flown = digest.unwrap_or_default();
                 format!("{name}: its mission of {relays} relays is not the one that the chain loaded (digest {flown:04x})")
-            })?)
+            })?;
+            Some(Loaded {
+                flying: sections.fleet.flying,
+                ..loaded
+            })
         }
         None => loaded(&Scenario::default(), largest, digest).ok().flatten(),
     };
@@ -101,6 +105,7 @@ fn loaded(scenario: &Scenario, relays: u16, digest: Option<u16>) -> Result<Optio
     let found = missions.find(|it| digest.is_none_or(|digest| it.digest() == digest));
     Ok(found.map(|mission| Loaded {
         mission,
+        flying: None,
         profiles,
         axis: scenario.line.map(|line| line.axis),
     }))

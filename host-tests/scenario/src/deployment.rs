@@ -9,8 +9,10 @@ use serde::Deserialize;
 use toml::Table;
 
 use super::keys::SECTIONS;
-use crate::check;
+use crate::Scenario;
+use crate::check::{self, mistake};
 use crate::error::{Problem, ScenarioError};
+use crate::fleet::FleetSize;
 
 /// Default network number of all programs. Relays ignore frames with any other network number.
 pub const NETWORK: u16 = 1;
@@ -40,7 +42,7 @@ pub struct Deployment {
 pub struct Network {
     /// Network number, 0 to 65535. Relays ignore frames with any other number.
     pub id: Option<u16>,
-    /// Number of relays in the chain, 1 to 1000.
+    /// Number of relays, 1 to 1000. With `fleet.flying` it is the number of drones of the fleet.
     pub relays: Option<u16>,
     /// File with the secret key that signs the frames of the network.
     pub key_file: Option<PathBuf>,
@@ -166,24 +168,93 @@ pub(super) fn split(mut table: Table) -> (Table, Table) {
 /// [`check::table`] must have accepted the tables before.
 pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, ScenarioError> {
     let sections = sections.clone();
-    sections
+    let sections: Deployment = sections
         .try_into()
-        .map_err(|error| check::internal_mismatch(file, &error))
+        .map_err(|error| check::internal_mismatch(file, &error))?;
+    sections.check_fleet(file)?;
+    Ok(sections)
 }
 
-/// Checks that `[network]` and `[plan]` have the same number of relays, if both state a number.
-///
-/// # Errors
-/// The error names the key, its value and the plan's number of relays.
-pub fn agree(file: &str, relays: Option<u16>, planned: Option<u16>) -> Result<(), ScenarioError> {
-    match (relays, planned) {
-        (Some(relays), Some(planned)) if relays != planned => Err(check::mistake(
-            file,
-            "network.relays",
-            Some(relays.to_string()),
-            Problem::OtherNumber,
-            format!("{planned}, the number of relays in [plan]; or leave network.relays out"),
-        )),
-        _ => Ok(()),
+impl Deployment {
+    /// Returns the numbers of relays in the fleet and in the chain; `None` without `network.relays`.
+    pub fn fleet_size(&self) -> Option<FleetSize> {
+        let relays = self.network.relays?;
+        let flying = self.fleet.flying.unwrap_or(relays);
+        Some(FleetSize { relays, flying })
+    }
+
+    /// Returns the error `problem` of the key `fleet.flying`, or of `network.relays` if `fleet.flying` is not given.
+    fn size_error(&self, file: &str, problem: Problem, allowed: String) -> ScenarioError {
+        let (key, value) = match self.fleet.flying {
+            Some(flying) => ("fleet.flying", Some(flying)),
+            None => ("network.relays", self.network.relays),
+        };
+        mistake(file, key, value.map(|it| it.to_string()), problem, allowed)
+    }
+
+    /// Checks that a number of relays that fly suits the number of all relays, and their ports.
+    fn check_fleet(&self, file: &str) -> Result<(), ScenarioError> {
+        let Some(flying) = self.fleet.flying else {
+            return Ok(());
+        };
+        let Some(relays) = self.network.relays else {
+            let allowed = "1 to 1000, the number of drones of which fleet.flying fly".to_owned();
+            return Err(mistake(
+                file,
+                "network.relays",
+                None,
+                Problem::Missing,
+                allowed,
+            ));
+        };
+        let least = relays / 2 + 1;
+        if !(least..=relays).contains(&flying) {
+            let allowed = format!("{least} to {relays}, more than half of network.relays");
+            return Err(self.size_error(file, Problem::OutOfRange, allowed));
+        }
+        let Companion {
+            upstream,
+            downstream,
+            ..
+        } = &self.companion;
+        if upstream.is_some() || downstream.is_some() {
+            let allowed = "companion.shared in place of upstream and downstream, because spares join only on a channel that all relays share; or leave fleet.flying out".to_owned();
+            return Err(self.size_error(file, Problem::NeedsChannel, allowed));
+        }
+        Ok(())
+    }
+
+    /// Checks that no `[[relay]]` of `scenario` differs from the others, if the fleet has spares.
+    ///
+    /// Any relay of such a fleet may fly, so its positions are known before flight only for identical relays.
+    ///
+    /// # Errors
+    /// The error names `fleet.flying`, its value and the remedy.
+    pub fn check_identical(&self, file: &str, scenario: &Scenario) -> Result<(), ScenarioError> {
+        let has_spares = self.fleet_size().is_some_and(|it| it.flying < it.relays);
+        if !has_spares || scenario.relays.is_empty() {
+            return Ok(());
+        }
+        let allowed =
+            "identical relays, because each of them may fly: leave [[relay]] out, or fleet.flying"
+                .to_owned();
+        Err(self.size_error(file, Problem::RelaysDiffer, allowed))
+    }
+
+    /// Checks that the chain and `[plan]` have the same number of relays, if both numbers are given.
+    ///
+    /// The chain has `fleet.flying` relays, or else `network.relays`.
+    ///
+    /// # Errors
+    /// The error names the key, its value and the plan's number of relays.
+    pub fn check_plan(&self, file: &str, planned: Option<u16>) -> Result<(), ScenarioError> {
+        match (self.fleet_size(), planned) {
+            (Some(size), Some(planned)) if size.flying != planned => {
+                let allowed =
+                    format!("{planned}, the number of relays in [plan]; or leave the key out");
+                Err(self.size_error(file, Problem::OtherNumber, allowed))
+            }
+            _ => Ok(()),
+        }
     }
 }

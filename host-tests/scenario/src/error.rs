@@ -54,8 +54,12 @@ pub enum Problem {
     UnknownChoice,
     /// The UDP address of an autopilot is malformed.
     NoEndpoint(EndpointError),
-    /// The number of positions in `[plan]`, or of relays in `[network]`, differs from `plan.uavs`.
+    /// The number of positions in `[plan]`, or of relays in the chain, differs from `plan.uavs`.
     OtherNumber,
+    /// The relays have spares, but a port to each neighbour instead of one shared channel.
+    NeedsChannel,
+    /// The relays have spares, but some of them have an altitude or power of their own.
+    RelaysDiffer,
     /// The file has a single table where a list of tables is required.
     NoList,
     /// The file has a list of tables where a single table is required.
@@ -107,6 +111,8 @@ impl fmt::Display for Problem {
             Self::UnknownChoice => "is not known",
             Self::NoEndpoint(error) => return error.fmt(f),
             Self::OtherNumber => "contradicts plan.uavs",
+            Self::NeedsChannel => "needs a shared channel",
+            Self::RelaysDiffer => "contradicts [[relay]]",
             Self::NoList => "is a table, and must be a list of tables",
             Self::NoTable => "is a list of tables, and must be a single table",
             Self::WrongType => "has the wrong type",

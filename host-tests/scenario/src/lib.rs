@@ -7,6 +7,7 @@
 //! | [`mission`] | the mission that relays fly in a scenario |
 //! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the hypothetical one that replaces them |
 //! | [`deployment`] | settings of a chain's programs, in sections of the same file |
+//! | [`fleet`] | fleets with more relays than their chain: first chain and spares |
 //! | [`endpoint`] | UDP address of an autopilot |
 //! | [`key`] | secret keys, from files |
 //! | [`number`] | conversion from the f64 of files to the f32 of relays |
@@ -21,6 +22,7 @@ pub mod deployment;
 pub mod endpoint;
 mod error;
 mod file;
+pub mod fleet;
 pub mod hypothetical;
 pub mod key;
 mod keys;
@@ -72,20 +74,20 @@ impl deployment::Deployment {
     /// Reads a scenario file: the scenario, and the settings of the programs.
     ///
     /// # Errors
-    /// If [`Scenario::load`] rejects the file, if one of the three sections has a mistake, or if the numbers of relays
-    /// in `[network]` and `[plan]` differ.
+    /// If [`Scenario::load`] rejects the file, if one of the four sections has a mistake, or if the numbers of relays in
+    /// the chain and in `[plan]` differ.
     pub fn load(path: &Path) -> Result<(Scenario, Self), ScenarioError> {
         let (name, text) = (path.display().to_string(), check::text_of(path)?);
         let scenario = Scenario::parse(&name, &text)?;
         let sections = Self::parse(&name, &text)?;
         let planned = scenario.plan.as_ref().map(|plan| plan.uavs);
-        deployment::agree(&name, sections.network.relays, planned)?;
+        sections.check_plan(&name, planned)?;
         Ok((scenario, sections))
     }
 
     /// Parses only the settings in `[network]`, `[fleet]`, `[companion]` and `[ground]` of a scenario file.
     ///
-    /// Unlike [`Self::load`], it accepts a number of relays in `[network]` that differs from the number in `[plan]`.
+    /// Unlike [`Self::load`], it accepts a number of relays in the chain that differs from the number in `[plan]`.
     /// `file_name` is used only in error messages.
     ///
     /// # Errors

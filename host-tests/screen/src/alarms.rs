@@ -32,6 +32,7 @@ pub enum Reason {
     Mission,
     Version,
     Stuck,
+    TooFew,
     Restarted,
     Measurements,
     NoReport,
@@ -55,7 +56,8 @@ impl Reason {
             | Self::NotReceived
             | Self::Mission
             | Self::Version
-            | Self::Stuck => Urgency::Warning,
+            | Self::Stuck
+            | Self::TooFew => Urgency::Warning,
             Self::Restarted | Self::Measurements | Self::NoReport | Self::Rejected => {
                 Urgency::Notice
             }
@@ -97,6 +99,7 @@ impl Reason {
                     "{by} does not fly to its setpoint: its autopilot's fence or limits may forbid it"
                 )
             }
+            Self::TooFew => "too few relays in the chain".to_owned(),
             Self::Restarted => format!("{by}: the autopilot was restarted"),
             Self::Measurements => {
                 format!("{by}: the measured interference does not fit one interferer")

@@ -11,7 +11,8 @@ use uav_relay::{
 use crate::alarms::{Alarms, Reason};
 use crate::hops::{db, hop_sirs, hop_sirs_back};
 use crate::snapshot::{
-    Condition, Fence, Frame, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Snapshot,
+    ChainSize, Condition, Fence, Frame, Hop, InterfererSnapshot, Node, Position, RelaySnapshot,
+    Snapshot,
 };
 
 /// Age of a report from which its relay counts as silent.
@@ -37,6 +38,8 @@ pub struct Chain<'a> {
     pub end: Side,
     /// Number of relays that are always listed: relays 1 to this number, even those without a report.
     pub relays: u16,
+    /// Number of relays that are meant to fly, if the fleet has spares; `None` if unknown.
+    pub flying: Option<u16>,
     /// Profiles (altitude and power) that differ from the mission's common profile, by relay number.
     pub profiles: &'a [(u16, Profile)],
     /// True if the interferer in `mission` is an estimate of the relays.
@@ -116,12 +119,36 @@ impl Chain<'_> {
                 ..Position::default()
             }),
             relays,
+            chain_size: self.size(reports, alarms),
             hops,
             interferers: self.interferer().into_iter().collect(),
             geofence: self.geofence.map(fence),
             alarms: alarms.all(),
             ..Snapshot::default()
         }
+    }
+
+    /// Returns the name of the chain: its number of relays, and that of the fleet if it has spares.
+    pub(crate) fn name(&self) -> String {
+        let relays = self.relays;
+        self.flying.map_or_else(
+            || format!("Chain of {relays} relays"),
+            |flying| format!("Chain of {flying} relays, of a fleet of {relays}"),
+        )
+    }
+
+    /// Returns the number of relays in the chain, with the number that is meant to fly, if that is known.
+    ///
+    /// A relay is in the chain if its report has a neighbour, and no alarm lasts that it is lost. A spare or a relay that
+    /// has left has no neighbour.
+    pub(crate) fn size(&self, reports: &[Report], alarms: &Alarms) -> Option<ChainSize> {
+        let is_in =
+            |it: &&Report| it.neighbours != [None; 2] && !alarms.lasts(Reason::Lost, it.relay);
+        let present = reports.iter().filter(is_in).count();
+        Some(ChainSize {
+            present: u16::try_from(present).unwrap_or(u16::MAX),
+            meant: self.flying?,
+        })
     }
 
     /// Returns true if relay `by` reports no neighbour on its side toward the relay `number`.

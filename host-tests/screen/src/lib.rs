@@ -60,8 +60,8 @@ pub use clean::clean;
 pub use request::{FILES, Task};
 pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, MAX_STREAMS, Post, Screen, TileReader, Tiles};
 pub use snapshot::{
-    Alarm, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine, Node,
-    Position, RelaySnapshot, Snapshot, Urgency,
+    Alarm, ChainSize, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine,
+    Node, Position, RelaySnapshot, Snapshot, Urgency,
 };
 
 /// Reason why a screen cannot be served.

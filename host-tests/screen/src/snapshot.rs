@@ -25,6 +25,9 @@ pub struct Snapshot {
     pub rx: Option<Position>,
     /// Known relays, including lost relays.
     pub relays: Vec<RelaySnapshot>,
+    /// Number of relays in the chain, and number that is meant to fly; `None` if the latter is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chain_size: Option<ChainSize>,
     /// Hops of the chain, from Tx to Rx.
     pub hops: Vec<Hop>,
     /// Known or estimated interferers.
@@ -101,6 +104,15 @@ impl RelaySnapshot {
             ..Self::default()
         }
     }
+}
+
+/// Number of relays in the chain, and number that is meant to fly.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct ChainSize {
+    /// Number of relays in the chain, by their reports. Lost relays do not count.
+    pub present: u16,
+    /// Number of relays that are meant to fly: `fleet.flying` of the scenario.
+    pub meant: u16,
 }
 
 /// Overall condition of a relay.

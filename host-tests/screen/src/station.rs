@@ -12,6 +12,7 @@
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
 //! | a relay refuses another one for another mission, old epoch or key, and that one does not report; or reports, but is refused for another mission for `LINGERS` more: a second node has its number | warning or critical, one for the refused relay |
+//! | for [`TOO_FEW_AFTER`] fewer relays in the chain than are meant to fly, and no more than at the start of this time | warning |
 //! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
@@ -25,7 +26,7 @@ use uav_relay::{Duration, Instant, Phase, Placement, Report, Side};
 
 use crate::alarms::{Alarms, Lasting, Reason, named};
 use crate::chain::{Chain, SILENT_AFTER, control, hold_reason, phase, seconds};
-use crate::snapshot::{LogLine, Snapshot};
+use crate::snapshot::{ChainSize, LogLine, Snapshot};
 
 /// Time without any received frame after which no alarm about a single silent relay begins.
 ///
@@ -59,6 +60,11 @@ const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after the drone was nearest to its setpoint from which a report with this setpoint confirms it.
 const CONFIRMED_AFTER: Duration = Duration::from_millis(2_000);
+
+/// Time after which too few relays in the chain cause an alarm.
+///
+/// A waiting spare that replaces a lost relay has joined by then.
+const TOO_FEW_AFTER: Duration = Duration::from_millis(30_000);
 
 /// Time after which a relay that has returned should no longer be refused for its earlier mission.
 ///
@@ -245,6 +251,8 @@ pub struct StationView {
     /// Alarms count a relay's silence from this time or later.
     resumed_at: Instant,
     rejected_at: Option<Instant>,
+    /// Number of relays in the chain, and time since which it is too small and has not risen; `None` if it suffices.
+    short: Option<(u16, Instant)>,
     /// Newest mission version that relays report, and the time when the station first received it.
     version: Option<(u16, Instant)>,
 }
@@ -309,14 +317,15 @@ impl StationView {
         self.follow_version(now);
         self.drop_answered_claims(now);
         self.follow_refusals(now);
+        let reports: Vec<Report> = self.reports().copied().collect();
+        self.follow_size(now, chain.size(&reports, &self.alarms));
         let lasting = self.lasting(now, chain);
         self.alarms.settle(seconds(now), lasting);
-        let reports: Vec<Report> = self.reports().copied().collect();
         let cleared: Vec<u16> = self.cleared.keys().copied().collect();
         let changed = self.known.iter();
         let changed = changed.map(|(number, it)| (*number, it.neighbours_at));
         Snapshot {
-            name: Some(format!("Chain of {} relays", chain.relays)),
+            name: Some(chain.name()),
             log,
             ..chain.snapshot(now, &reports, &self.alarms, &cleared, &changed.collect())
         }
@@ -382,6 +391,17 @@ impl StationView {
             self.rejected_at = Some(now);
         }
         self.frames = frames;
+    }
+
+    /// Updates since when the chain has too few relays. Before any relay is in the chain, it has not.
+    fn follow_size(&mut self, now: Instant, size: Option<ChainSize>) {
+        let size = size.filter(|it| (1..it.meant).contains(&it.present));
+        self.short = size.map(|ChainSize { present, .. }| match self.short {
+            Some((before, at)) if present <= before || self.alarms.lasts(Reason::TooFew, 0) => {
+                (present, at)
+            }
+            _ => (present, now),
+        });
     }
 
     /// Drops each neighbour's claim that a relay is silent, once that relay has sent a newer report.
@@ -481,6 +501,12 @@ impl StationView {
                 self.gaps(now)
             };
             add(Reason::NoReport, 0, unknown, note);
+        }
+        if let (Some((present, since)), Some(meant)) = (self.short, chain.flying)
+            && now.since(since) >= TOO_FEW_AFTER
+        {
+            let note = format!(": {present}, of {meant} that are meant to fly");
+            add(Reason::TooFew, 0, Vec::new(), note);
         }
         let is_recent = |at: Instant| now.since(at) < REJECTED_FOR;
         if self.rejected_at.is_some_and(is_recent) {

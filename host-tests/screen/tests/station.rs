@@ -51,6 +51,7 @@ struct Watched {
     relays: BTreeMap<u16, Report>,
     off: BTreeSet<u16>,
     of: u16,
+    flying: Option<u16>,
     mission: Mission,
     second: u64,
     frames: Frames,
@@ -69,6 +70,7 @@ impl Watched {
             relays: (1..=of).map(|it| (it, healthy(it, of))).collect(),
             off: BTreeSet::new(),
             of,
+            flying: None,
             mission: paper::MISSION.with_relays(of).unwrap(),
             second: 0,
             frames: Frames::default(),
@@ -97,6 +99,7 @@ impl Watched {
             mission: Some(&self.mission),
             end: Side::Upstream,
             relays: self.of,
+            flying: self.flying,
             profiles: &[],
             is_estimated: false,
             axis: None,
@@ -539,4 +542,49 @@ fn the_alarm_of_another_mission_begins_again() {
     watched.changes("13:ok");
     watched.second();
     assert_eq!(watched.lasting(), ".");
+}
+
+/// Checks the numbers of relays in a fleet with two spares, and the alarm that too few are in the chain.
+#[test]
+fn too_few_relays_in_the_chain_are_an_alarm() {
+    let mut watched = Watched {
+        flying: Some(3),
+        ..Watched::new()
+    };
+    let said = |watched: &Watched| {
+        let all = watched.lasting();
+        all.contains("too few relays").then_some(all)
+    };
+    let size = |watched: &Watched| {
+        let size = watched.last.chain_size.unwrap();
+        (size.present, size.meant)
+    };
+    // Spares have no neighbours.
+    for spare in [2, 4] {
+        watched.relays.get_mut(&spare).unwrap().neighbours = [None; 2];
+    }
+    let run = |watched: &mut Watched, seconds: u64| (0..seconds).for_each(|_| watched.second());
+    run(&mut watched, 40);
+    assert_eq!((size(&watched), said(&watched)), ((3, 3), None));
+    let name = watched.last.name.clone();
+    assert_eq!(name.as_deref(), Some("Chain of 3 relays, of a fleet of 5"));
+    // A relay leaves, and no spare joins.
+    watched.relays.get_mut(&5).unwrap().neighbours = [None; 2];
+    run(&mut watched, 30);
+    assert_eq!((size(&watched), said(&watched)), ((2, 3), None));
+    run(&mut watched, 1);
+    let alarm = "1 Warning too few relays in the chain: 2, of 3 that are meant to fly";
+    assert_eq!(said(&watched).as_deref(), Some(alarm));
+    watched.relays.get_mut(&4).unwrap().neighbours = [Some(3), None];
+    run(&mut watched, 2);
+    assert_eq!((size(&watched), said(&watched)), ((3, 3), None));
+    // A silent relay does not count, and the alarm waits while relays join.
+    watched.changes("1:off 3:off");
+    run(&mut watched, 25);
+    assert_eq!((size(&watched), said(&watched)), ((1, 3), None));
+    watched.changes("3:ok");
+    run(&mut watched, 25);
+    assert_eq!((size(&watched), said(&watched)), ((2, 3), None));
+    run(&mut watched, 10);
+    assert!(said(&watched).is_some());
 }

@@ -78,12 +78,13 @@ function table({ relays, hops }, silence = 0) {
   });
 }
 
-function summary({ relays, hops }) {
+function summary({ relays, hops, chain_size: size }) {
   const lost = relays.filter(({ condition }) => condition === "lost").map((relay) => relay.number);
   const ways = hops.flatMap((hop) => [{ from: hop.from, to: hop.to, db: hopDb(hop) }, { from: hop.to, to: hop.from, db: backDb(hop) }]);
   const [first] = ways.filter(({ db }) => typeof db === "number").sort((one, other) => one.db - other.db);
   const worst = first ? `worst hop ${first.from} to ${first.to}: ${fixed(first.db, 1)} dB` : "no SIR known";
-  return `${relays.length} relays, ${lost.length ? `lost: ${lost.join(", ")}` : "none lost"}; ${worst}`;
+  const all = size ? `${size.present} relays in the chain, ${size.meant} are meant to fly; fleet of ${relays.length}` : `${relays.length} relays`;
+  return `${all}, ${lost.length ? `lost: ${lost.join(", ")}` : "none lost"}; ${worst}`;
 }
 
 function say(id, text) {

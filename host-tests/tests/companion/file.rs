@@ -169,6 +169,9 @@ fn errors_of_the_file_are_named() {
         "[companion]\nautopilot_baud = 57600",
         "[companion]\nautopilot_key_file = \"key\"",
         "[companion]\nkey = 5",
+        "[fleet]\nflying = 2",
+        "[network]\nrelays = 4\n[fleet]\nflying = 2",
+        "[network]\nrelays = 3\n[fleet]\nflying = 2\n[companion]\nupstream = \"a\"",
     ] {
         let file = folder.write("drone.toml", format!("{SCENARIO}\n{sections}\n"));
         let line = start(&file, "--index 1 --of 1").refused(2);

@@ -23,6 +23,10 @@ const WRONG: &[&str] = &[
     "--index 2 --of 3 --downstream a",
     "--index 2 --of 2",
     "--shared x",
+    "--flying 3",
+    "--index 1 --of 6 --shared a --flying 3",
+    "--index 1 --of 6 --shared a --flying 7",
+    "--index 1 --of 6 --shared a --flying 1001",
     // The channel cannot carry the chain.
     "--index 2 --of 50 --shared a --baud 57600",
     "--baud 1199",

@@ -208,6 +208,8 @@ fn wrong_options_of_a_station_are_named() {
     ] {
         cases.push((format!("--stand {option}"), status, why.to_owned()));
     }
+    let range = "must be within 2 to 3, more than half of --of".to_owned();
+    cases.push(("--stand --flying 1".to_owned(), 2, range));
     let from = ["udp:", "udp:0", "udp:65536", "udp::9000", "udp:localhost:x"];
     let from = from.map(|from| (from, udp));
     let files = [

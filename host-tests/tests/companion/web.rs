@@ -54,7 +54,8 @@ fn a_station_without_a_chain_has_a_page_with_snapshots() {
     let (files, tty) = (Files::new(), Pty::new());
     let signed = files.signed("key", "epoch");
     let path = tty.path().display();
-    let stand = format!("--of 3 --end tx --stand --web 127.0.0.1:0 --tty {path} {signed}");
+    let stand =
+        format!("--of 3 --flying 2 --end tx --stand --web 127.0.0.1:0 --tty {path} {signed}");
     let mut station = Relay::ground(&stand);
     let address = address(&mut station);
     let mut page = String::new();
@@ -70,6 +71,9 @@ fn a_station_without_a_chain_has_a_page_with_snapshots() {
     assert!(times.is_sorted_by(|one, next| next - one > 0.19));
     let last = &shown[10];
     assert_eq!(last["relays"].as_array().unwrap().len(), 3);
+    assert_eq!(last["name"], "Chain of 2 relays, of a fleet of 3");
+    let size = serde_json::json!({ "present": 0, "meant": 2 });
+    assert_eq!(last["chain_size"], size);
     assert!(
         last["relays"]
             .as_array()

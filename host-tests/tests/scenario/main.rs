@@ -2,6 +2,7 @@
 
 mod earth;
 mod example;
+mod fleet;
 mod keys;
 mod meaning;
 mod mistakes;

@@ -66,6 +66,7 @@ impl Flight {
             mission: Some(&self.mission),
             end: Side::Upstream,
             relays: RELAYS,
+            flying: None,
             profiles: &[],
             is_estimated: false,
             axis: None,

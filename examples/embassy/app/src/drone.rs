@@ -86,6 +86,10 @@ pub(crate) fn begin<F: NorFlash>(
     log::started(board.reset);
     let parsed = config::read(&board.block, &mut storage.field).map_err(Refused::Block)?;
     log::begins(&parsed);
+    if parsed.flying > 0 {
+        // This firmware is built without departures.
+        return Err(Refused::Setup(SetupError::Flying));
+    }
     let auth = sign(&mut board)?;
     let autopilot = match &parsed.sites {
         Some(_) if !flies => return Err(Refused::NoAutopilot),

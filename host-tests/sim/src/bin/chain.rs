@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use clap::Parser as _;
 use uav_relay_capture::{Capture, Direction, Frame, Interface};
 use uav_relay_scenario::Scenario;
+use uav_relay_scenario::deployment::Deployment;
 use uav_relay_screen::Screen;
 use uav_relay_sim::cli::{Options, Prepared, Refused};
 use uav_relay_sim::command::Failure;
@@ -23,9 +24,26 @@ use uav_relay_sim::{command, svg};
 
 fn main() -> ExitCode {
     match Options::try_parse() {
-        Ok(options) => command::ended(run(&options.settled())),
+        Ok(options) => command::ended(with_flying(options).and_then(|it| run(&it.settled()))),
         Err(error) => command::usage(&error),
     }
+}
+
+/// Returns the options, with `--flying` from `fleet.flying` of the scenario if only `--fleet` is given.
+fn with_flying(mut options: Options) -> Result<Options, Failure> {
+    let rotation = &mut options.hostile.flight.rotation;
+    if let (Some(fleet), None, Some(file)) = (rotation.fleet, rotation.flying, &options.scenario) {
+        let loaded = Deployment::load(file).map_err(|error| Failure::input(error.to_string()))?;
+        rotation.flying = loaded.1.fleet.flying;
+        let least = fleet / 2 + 1;
+        if let Some(flying) = rotation.flying.filter(|it| !(least..=fleet).contains(it)) {
+            return Err(Failure::input(format!(
+                "{}: fleet.flying = {flying}: must be within {least} to {fleet}, more than half of --fleet {fleet}; or give --flying",
+                file.display()
+            )));
+        }
+    }
+    Ok(options)
 }
 
 fn run(options: &Options) -> Result<(), Failure> {

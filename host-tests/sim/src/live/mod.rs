@@ -22,6 +22,8 @@ use alarms::Observe as _;
 pub struct LiveView {
     axis: Option<Axis>,
     geofence: Option<Geofence>,
+    /// Number of relays that are meant to fly; `None` without spares.
+    flying: Option<u16>,
     alarms: Alarms,
     /// Number of log entries of the run that earlier snapshots have already shown.
     told: usize,
@@ -35,6 +37,7 @@ impl LiveView {
         Self {
             axis: setup.fleet.as_ref().map(|fleet| fleet.axis),
             geofence: setup.settings.guard.map(|guard| guard.geofence),
+            flying: Some(setup.settings.flying).filter(|it| *it > 0),
             alarms: Alarms::default(),
             told: 0,
             known: BTreeMap::new(),
@@ -71,6 +74,7 @@ impl LiveView {
             mission: Some(chain.mission()),
             end: Side::Upstream,
             relays: 0,
+            flying: self.flying,
             profiles: &profiles,
             is_estimated,
             axis: self.axis.as_ref(),

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::json;
+use super::{json, refusal};
 
 /// Minimum separation of the default scenario, m.
 const SEPARATION_M: f64 = 4.0;
@@ -28,6 +28,24 @@ fn a_fleet_of_twelve_replaces_its_tired_drones() {
         let nearest_m = announced["nearest_m"].as_f64().unwrap();
         assert!(nearest_m >= SEPARATION_M - 2.0 * ERROR_M, "{figures}");
     }
+}
+
+/// Checks that `fleet.flying` of a scenario has the effect of `--flying`, and that its error names the key.
+#[test]
+fn a_scenario_says_how_many_relays_fly() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let text = uav_relay_scenario::DEFAULT;
+    let sections = "\n[network]\nrelays = 3\n[fleet]\nflying = 2\n";
+    std::fs::write(file.path(), format!("{text}{sections}")).unwrap();
+    let path = file.path().display();
+    let run = format!("--scenario {path} --fly --fleet 3 --soak 60");
+    let by_file = json(&run);
+    assert_eq!(by_file, json(&format!("{run} --flying 2")));
+    assert_ne!(by_file, json(&format!("{run} --flying 3")));
+    let (status, line) = refusal(&format!("--scenario {path} --fly --fleet 5 --soak 60"));
+    let wanted =
+        "fleet.flying = 2: must be within 3 to 5, more than half of --fleet 5; or give --flying";
+    assert!(status == 2 && line.contains(wanted), "{line}");
 }
 
 /// Checks chains of two sizes for eight hours on channels that lose none, 30 % and half of the frames.

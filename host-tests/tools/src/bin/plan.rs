@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
-use uav_relay_scenario::deployment::{Companion, Deployment, agree};
+use uav_relay_scenario::deployment::{Companion, Deployment};
 use uav_relay_scenario::link::{Access, BandwidthError, Radio};
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{Failure, number, whole};
@@ -24,7 +24,7 @@ use uav_relay_tools::plan::locating::Locating;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
 use uav_relay_tools::plan::over_terrain::{self, OverTerrain};
 use uav_relay_tools::plan::rate::{Rate, Rates};
-use uav_relay_tools::plan::report::{PlanReport, RateReport};
+use uav_relay_tools::plan::report::{FleetReport, PlanReport, RateReport};
 use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M, chart};
 use uav_relay_tools::plan::terrain_flight::{self, Flight, no_fly_warnings};
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
@@ -32,9 +32,27 @@ use uav_relay_tools::provision::block::probe_after_ms;
 
 fn main() -> ExitCode {
     match Options::try_parse() {
-        Ok(options) => command::ended(run(&options)),
+        Ok(options) => command::ended(settled(options).and_then(|options| run(&options))),
         Err(error) => command::usage(&error),
     }
+}
+
+/// Returns the options, with `--uavs` from `fleet.flying` of the scenario if the request names neither number nor target.
+fn settled(mut options: Options) -> Result<Options, Failure> {
+    let Wanted {
+        uavs,
+        target_sir,
+        target_sir_db,
+        target_rate_bps,
+    } = options.wanted;
+    if uavs.is_none() && [target_sir, target_sir_db, target_rate_bps] == [None; 3] {
+        options.wanted.uavs = deployment(&options)?.fleet.flying;
+        if options.wanted.uavs.is_none() {
+            let line = "one of --uavs, --target-sir, --target-sir-db and --target-rate-bps is required, unless the scenario has fleet.flying";
+            return Err(Failure::input(line.to_owned()));
+        }
+    }
+    Ok(options)
 }
 
 fn run(options: &Options) -> Result<(), Failure> {
@@ -46,6 +64,10 @@ fn run(options: &Options) -> Result<(), Failure> {
         let line = "[[interferer]]: is missing: only `cargo provision` accepts a scenario with [listen] and without [[interferer]]";
         return Err(Failure::input(line.to_owned()));
     }
+    let sections = deployment(options)?;
+    sections
+        .check_identical(&options.file(), &scenario)
+        .map_err(|error| Failure::input(error.to_string()))?;
     let number = options.number();
     check_area(options, &scenario)?;
     check_target(options, &scenario)?;
@@ -156,6 +178,7 @@ fn report(
             flight_not_simulated: unknown,
             locating,
             area: AreaReport::new(scenario, ask, plan, options.area.quantile),
+            fleet: FleetReport::new(deployment(options)?.fleet_size(), uavs),
             ..report
         },
     )?;
@@ -320,7 +343,7 @@ fn compared(
 fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>, Failure> {
     let has_files = scenario.terrain.is_some() || !options.terrain.dem.is_empty();
     let error_m = if has_files {
-        companion(options)?.position_error_m
+        deployment(options)?.companion.position_error_m
     } else {
         None
     };
@@ -343,16 +366,6 @@ fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>
         )));
     }
     Ok(elevation)
-}
-
-/// Returns the section `[companion]` of the scenario file.
-fn companion(options: &Options) -> Result<Companion, Failure> {
-    let Some(path) = &options.scenario else {
-        return Ok(Companion::default());
-    };
-    let (_, sections) =
-        Deployment::load(path).map_err(|error| Failure::input(error.to_string()))?;
-    Ok(sections.companion)
 }
 
 /// Returns the terrain below `plan`, and the reason to reject the plan, if there is one.
@@ -573,11 +586,11 @@ struct AreaOptions {
     allow_crossing: bool,
 }
 
-/// Request: exactly one of these.
+/// Request: exactly one of these, or none if the scenario has `fleet.flying`.
 #[derive(Args, Debug)]
-#[group(required = true, multiple = false)]
+#[group(multiple = false)]
 struct Wanted {
-    /// The best places for this number of relays, 1 to 1000
+    /// The best places for this number of relays, 1 to 1000; by default fleet.flying of the scenario
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
     uavs: Option<u16>,
     /// Find the fewest relays that give every hop this SIR, linear, 1e-9 to 1e9
@@ -814,6 +827,19 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         return refuse(format!(
             "{what}: cannot be used with --out and [listen], because the method joint needs a known interferer: {remedy}, or leave [listen] out"
         ));
+    }
+    let size = deployment(options)?.fleet_size();
+    if let Some(size) = size.filter(|it| it.flying < it.relays) {
+        if options.altitude == Altitude::Terrain {
+            return refuse(
+                "--altitude terrain: cannot be used with --out and spares, because each relay would have the altitude of one position: leave fleet.flying out"
+                    .to_owned(),
+            );
+        }
+        // All relays of the fleet load this mission.
+        if let Err(refusal) = mission::mission(scenario, size.relays, options.tolerance) {
+            return refuse(format!("{}: {refusal}", options.file()));
+        }
     }
     if options.wanted.target_rate_bps.is_none()
         && let Number::Of(relays) = options.number()
@@ -1064,18 +1090,21 @@ fn write_out(
 }
 
 /// Loads the sections `[network]`, `[fleet]`, `[companion]` and `[ground]` of the scenario file.
-///
-/// It is an error if `[network]` has a number of relays other than `relays`.
-fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
+fn deployment(options: &Options) -> Result<Deployment, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Deployment::default());
     };
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path)
         .map_err(|error| Failure::input(format!("{name}: {error}")))?;
-    let sections =
-        Deployment::parse(&name, &text).map_err(|error| Failure::input(error.to_string()))?;
-    agree(&name, sections.network.relays, Some(relays))
+    Deployment::parse(&name, &text).map_err(|error| Failure::input(error.to_string()))
+}
+
+/// Loads the same sections. It is an error if the chain has a number of relays other than `relays`.
+fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
+    let sections = deployment(options)?;
+    sections
+        .check_plan(&options.file(), Some(relays))
         .map_err(|error| Failure::input(error.to_string()))?;
     Ok(sections)
 }
@@ -1087,7 +1116,11 @@ fn next(file: &str, sections: &Deployment, allow_blocked: bool) -> String {
         ""
     };
     let firmware = format!("  cargo provision --scenario {file} --all --out-dir DIR{more}\n");
-    let companions = format!("  cargo companion --config {file} --index INDEX\n");
+    let fleet = FleetReport::new(sections.fleet_size(), sections.fleet.flying.unwrap_or(0));
+    let spares = fleet.map_or_else(String::new, |it| {
+        format!("for the spares (relays {}) also --spare\n", it.list())
+    });
+    let companions = format!("  cargo companion --config {file} --index INDEX\n{spares}");
     let is_for_companions = sections.companion != Companion::default();
     match (
         probe_after_ms(&sections.network, None, file),

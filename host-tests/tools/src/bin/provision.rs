@@ -8,6 +8,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use clap::{Args, Parser, ValueEnum};
 use uav_relay::{Adjust, ChannelLoad, Duration, Local, Measure};
 use uav_relay_scenario::deployment::{COMPANION_TOLERANCE, Deployment, NETWORK, Network};
+use uav_relay_scenario::fleet::FleetSize;
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command;
 use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
@@ -32,6 +33,8 @@ struct Asked<'a> {
     network: u16,
     key_file: Option<PathBuf>,
     uavs: u16,
+    /// Numbers of relays in the fleet and in the chain; `None` if the scenario has no `fleet.flying`.
+    fleet: Option<FleetSize>,
     method: Method,
     tolerance: f64,
     /// Silence of a neighbour after which a relay requests heartbeats, ms; 0 for the firmware's default.
@@ -118,20 +121,36 @@ impl<'a> Asked<'a> {
             |file| file.display().to_string(),
         );
         let plan = scenario.plan.as_ref();
+        deployment
+            .check_identical(&name, &scenario)
+            .map_err(|error| error.to_string())?;
+        let fleet = deployment.fleet.flying.and(deployment.fleet_size());
+        if fleet.is_some() && options.wires {
+            return Err(format!(
+                "--wires: spares join only on a channel that all relays share, and {name} has fleet.flying: leave one of them out"
+            ));
+        }
         let other = |option: &str, has: &str| {
             format!(
                 "{option}: {name} has a [plan] with {has}; leave the option out, or run `cargo plan --out` again"
             )
         };
-        let uavs = match (options.uavs, plan) {
-            (Some(uavs), Some(plan)) if uavs != plan.uavs => {
+        let uavs = match (options.uavs, plan, fleet) {
+            (Some(uavs), _, Some(fleet)) if uavs != fleet.relays => {
+                return Err(format!(
+                    "--uavs {uavs}: {name} has fleet.flying and network.relays = {}; leave the option out, or change network.relays",
+                    fleet.relays
+                ));
+            }
+            (_, _, Some(fleet)) => fleet.relays,
+            (Some(uavs), Some(plan), _) if uavs != plan.uavs => {
                 return Err(other(
                     &format!("--uavs {uavs}"),
                     &format!("uavs = {}", plan.uavs),
                 ));
             }
-            (_, Some(plan)) => plan.uavs,
-            (uavs, None) => uavs.or(section.relays).ok_or_else(|| {
+            (_, Some(plan), _) => plan.uavs,
+            (uavs, None, _) => uavs.or(section.relays).ok_or_else(|| {
                 format!(
                     "--uavs: is missing, and so are [plan] and network.relays in {name}; allowed: 1 to 1000"
                 )
@@ -185,10 +204,16 @@ impl<'a> Asked<'a> {
             deployment,
             key_file: options.key_file.clone().or(of_file),
             uavs,
+            fleet,
             method,
             tolerance,
             probe_after_ms,
         })
+    }
+
+    /// Returns the number of relays in the chain.
+    fn flying(&self) -> u16 {
+        self.fleet.map_or(self.uavs, |fleet| fleet.flying)
     }
 
     fn flight(&self, secret: Option<Secret>) -> Result<Flight, String> {
@@ -227,7 +252,8 @@ impl<'a> Asked<'a> {
             .signed(secret)
             .signed_to_autopilots(autopilot_key)
             .measuring(measure(options, &self.scenario)?)
-            .with_probe_after(self.probe_after_ms))
+            .with_probe_after(self.probe_after_ms)
+            .with_fleet(self.fleet))
     }
 
     /// Returns the positions that the relays will choose; `None` if they are not needed or not known.
@@ -258,7 +284,7 @@ impl<'a> Asked<'a> {
             Method::Align | Method::Adjust => PlannedMethod::Align,
         };
         // Relays report it themselves if they agree on no positions.
-        let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
+        let Ok(flown) = flown(&self.scenario, self.flying(), method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
                     "{}: [plan] does not fit this scenario: the relays would reach no agreement; run `cargo plan` again",
@@ -318,7 +344,7 @@ impl<'a> Asked<'a> {
             return Ok(self.unchecked("the relays' positions are not known before the flight"));
         };
         let Some(elevation) = Elevation::load(&self.scenario, &[], error_m).map_err(named)? else {
-            let lines = no_fly_warnings(&self.scenario, self.uavs, (method, self.tolerance));
+            let lines = no_fly_warnings(&self.scenario, self.flying(), (method, self.tolerance));
             lines.map_err(failed)?.into_iter().for_each(warn);
             return Ok(None);
         };
@@ -478,7 +504,10 @@ impl<'a> Asked<'a> {
             ground_m: self.ground_m()?,
             text,
             deployment: &self.deployment,
-            uavs: self.uavs,
+            fleet: self.fleet.unwrap_or(FleetSize {
+                relays: self.uavs,
+                flying: self.uavs,
+            }),
             network: self.network,
             method: &format!("{:?}", self.method).to_lowercase(),
             mission: flight.mission(),
@@ -512,7 +541,10 @@ impl<'a> Asked<'a> {
     ) -> Result<String, String> {
         let heading = Heading {
             scenario: self.name.clone(),
-            uavs: self.uavs,
+            fleet: self.fleet.unwrap_or(FleetSize {
+                relays: self.uavs,
+                flying: self.uavs,
+            }),
             network: self.network,
             method: format!("{:?}", self.method).to_lowercase(),
             signed: self.key_file.is_some(),

@@ -4,6 +4,7 @@ use std::fmt;
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use uav_relay_scenario::fleet::FleetSize;
 use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::{Noise, Scenario};
 use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, counted, db, hops_table, relays};
@@ -299,6 +300,36 @@ const NOT_IN_TERRAIN: &str =
 /// Text at the end of a plan for data toward Rx only.
 const ONE_WAY: &str = "; not optimised: the way back from Rx to Tx";
 
+/// Fleet with more relays than the planned chain.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct FleetReport {
+    /// Number of relays of the fleet.
+    pub relays: u16,
+    /// Number of relays that are meant to fly.
+    pub flying: u16,
+    /// Numbers of the relays that wait as spares at the start.
+    pub spares: Vec<u16>,
+}
+
+impl FleetReport {
+    /// Creates the report; `None` without spares, or if `planned`, the number of planned relays, is not the chain's.
+    pub fn new(size: Option<FleetSize>, planned: u16) -> Option<Self> {
+        let FleetSize { relays, flying } =
+            size.filter(|it| it.flying == planned && it.flying < it.relays)?;
+        Some(Self {
+            relays,
+            flying,
+            spares: size?.spares(),
+        })
+    }
+
+    /// Returns the numbers of the spares as text.
+    pub fn list(&self) -> String {
+        let numbers: Vec<String> = self.spares.iter().map(u16::to_string).collect();
+        numbers.join(", ")
+    }
+}
+
 /// Report of `cargo plan`, printed as a table or as JSON.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct PlanReport {
@@ -396,6 +427,9 @@ pub struct PlanReport {
     /// Reason why the flight over the terrain was not simulated; absent if it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flight_not_simulated: Option<String>,
+    /// Fleet of the scenario; absent without spares, and if the chain has another number of relays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fleet: Option<FleetReport>,
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
@@ -467,6 +501,7 @@ impl PlanReport {
             flight: None,
             flight_not_simulated: None,
             area: None,
+            fleet: None,
             locating: None,
             room: !plan.mission.config().lateral.is_single(),
             unit,
@@ -566,6 +601,15 @@ impl PlanReport {
             " with {uavs} {relays}, by {}",
             self.how.unwrap_or("nothing")
         );
+        if let Some(fleet) = &self.fleet {
+            let FleetReport { relays, flying, .. } = fleet;
+            _ = writeln!(
+                text,
+                "fleet: {relays} relays, {flying} are meant to fly, {} in reserve; spares at the start: {}",
+                fleet.spares.len(),
+                fleet.list()
+            );
+        }
         if let (Some(case), Some(words)) = (self.case, &self.case_words) {
             let theorem = self.how.unwrap_or_default();
             _ = writeln!(text, "{words} ({theorem}, case {case})");

@@ -7,6 +7,7 @@ use uav_relay::{
     Duration, Identity, Interference, Listen, Measure, Method, Mission, Profile, Settings,
 };
 use uav_relay_scenario::deployment::Network;
+use uav_relay_scenario::fleet::FleetSize;
 use uav_relay_scenario::mission::Refusal;
 use uav_relay_scenario::{AirGround, ChannelSpec, Scenario, mission};
 
@@ -105,6 +106,8 @@ pub struct Flight {
     network: u16,
     /// Silence of a neighbour after which a relay requests heartbeats, ms; 0 for the firmware's default.
     probe_after_ms: u32,
+    /// Numbers of relays in the fleet and in the chain; `None` without spares.
+    fleet: Option<FleetSize>,
 }
 
 impl Flight {
@@ -144,6 +147,7 @@ impl Flight {
             autopilot_key: None,
             network,
             probe_after_ms: 0,
+            fleet: None,
         })
     }
 
@@ -175,6 +179,11 @@ impl Flight {
             probe_after_ms,
             ..self
         }
+    }
+
+    /// Sets the numbers of relays in the fleet and in the chain; `None` if the leader keeps no number of relays.
+    pub fn with_fleet(self, fleet: Option<FleetSize>) -> Self {
+        Self { fleet, ..self }
     }
 
     /// Sets the key and epoch for signing frames; `None` for unsigned frames.
@@ -253,6 +262,8 @@ impl Flight {
             listen: self.listen,
             sites: self.sites,
             probe_after_ms: self.probe_after_ms,
+            flying: self.fleet.map_or(0, |fleet| fleet.flying),
+            spare: self.fleet.is_some_and(|fleet| fleet.rank(index).is_none()),
         };
         let block = write(&config, &self.numbers, self.secret, self.autopilot_key);
         let read = read(&block, Box::leak(Box::new(EMPTY))).map_err(BlockError::Config)?;

@@ -7,9 +7,10 @@ use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::path::Path;
 
 use toml_edit::{DocumentMut, Item, Table, TableLike, value};
-use uav_relay::{GuardConfig, Mission, Placement, Profile, Side};
+use uav_relay::{GuardConfig, Mission, Placement, Profile};
 use uav_relay_scenario::Line;
 use uav_relay_scenario::deployment::Deployment;
+use uav_relay_scenario::fleet::FleetSize;
 
 use crate::plan::terrain_flight::{Flight, ROOM};
 
@@ -47,8 +48,8 @@ pub struct Bundle<'a> {
     pub text: String,
     /// Sections `[network]`, `[fleet]`, `[companion]` and `[ground]` of the scenario file.
     pub deployment: &'a Deployment,
-    /// Number of relays.
-    pub uavs: u16,
+    /// Numbers of relays in the fleet and in the chain.
+    pub fleet: FleetSize,
     /// Network number of the relays.
     pub network: u16,
     /// Placement method of the relays.
@@ -57,7 +58,7 @@ pub struct Bundle<'a> {
     pub mission: &'a Mission,
     /// Profiles (power, altitude) that differ from the mission's common profile, by relay index.
     pub profiles: &'a [(u16, Profile)],
-    /// Positions that the relays will agree on; empty if unknown.
+    /// Positions that the relays of the first chain will agree on; empty if unknown.
     pub places: &'a [(Placement, Profile)],
     /// Simulated flight over the terrain; `None` without terrain.
     pub simulated: Option<&'a Flight>,
@@ -154,6 +155,9 @@ impl Bundle<'_> {
         written_files(section, "companion", &["log_file", "capture"])?;
         absolute(section, "companion", &["positions"])?;
         section.insert("index", value(i64::from(index)));
+        if self.deployment.fleet.flying.is_some() {
+            section.insert("spare", value(self.fleet.rank(index).is_none()));
+        }
         let mut ports = vec!["shared"];
         if own.upstream.is_some() || own.downstream.is_some() {
             ports = vec!["upstream", "downstream"];
@@ -162,7 +166,7 @@ impl Bundle<'_> {
         let at_rx = self.deployment.ground.end.as_deref() == Some("rx");
         let ends = [
             ("upstream", index == 1 && at_rx),
-            ("downstream", index == self.uavs && !at_rx),
+            ("downstream", index == self.fleet.relays && !at_rx),
         ];
         for (port, is_missing) in ends {
             if is_missing && ports.contains(&port) {
@@ -290,7 +294,7 @@ impl Bundle<'_> {
         }
         let network = section(&mut file, "network")?;
         network.insert("id", value(i64::from(self.network)));
-        network.insert("relays", value(i64::from(self.uavs)));
+        network.insert("relays", value(i64::from(self.fleet.relays)));
         network.insert("method", value(self.method));
         network.insert("key_file", value("network.key"));
         Ok(file)
@@ -309,7 +313,7 @@ impl Bundle<'_> {
     /// chain and, if there is a terrain, above the ground between Tx and Rx.
     fn return_m(&self, index: u16) -> f64 {
         let [tx, rx] = self.line.sites.map(|site| f64::from(site.amsl_mm) / 1e3);
-        let highest = (1..=self.uavs).map(|of| f64::from(self.fence(of).most_altitude_m));
+        let highest = (1..=self.fleet.relays).map(|of| f64::from(self.fence(of).most_altitude_m));
         // A fence altitude is above the line from Tx to Rx. An autopilot's altitude is above its home.
         let highest_m = tx.max(rx) + highest.fold(20.0, f64::max);
         let [low, high] = self.ground_m.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
@@ -331,14 +335,14 @@ impl Bundle<'_> {
         // Drones take off near the chain, so that this radius contains the flight.
         let radius_m = (f64::from(config.distance_m) + wide_m + 200.0).ceil();
         let radius_m = radius_m.min(FENCE_RADIUS_M);
-        let ceiling_m = return_m(self.uavs) + 20.0;
+        let ceiling_m = return_m(self.fleet.relays) + 20.0;
         if ceiling_m > FENCE_ALT_M {
             let over = self.ground_m.map_or(String::new(), |[low, high]| {
                 format!(" and above the ground, {low:.1} to {high:.1} m above the sea,")
             });
             return Err(format!(
                 "FENCE_ALT_MAX would be {ceiling_m} m: {} drones that return above each other, above the chain{over} need a fence above {FENCE_ALT_M} m, which ArduCopter does not have",
-                self.uavs
+                self.fleet.relays
             ));
         }
         let baud = self.deployment.companion.autopilot_baud.unwrap_or(115_200);
@@ -390,19 +394,27 @@ impl Bundle<'_> {
     }
 
     fn heading(&self, who: &str) -> String {
-        let (uavs, network, digest) = (self.uavs, self.network, self.mission.digest());
-        format!("{who}, chain of {uavs} relays, network {network}, mission 0x{digest:04x}\n\n")
+        let FleetSize { relays, flying } = self.fleet;
+        let (network, digest) = (self.network, self.mission.digest());
+        let what = if flying < relays {
+            format!("chain of {flying} of {relays} relays")
+        } else {
+            format!("chain of {relays} relays")
+        };
+        format!("{who}, {what}, network {network}, mission 0x{digest:04x}\n\n")
     }
 
     /// Returns the page to print for relay `index`.
     fn page(&self, index: u16) -> String {
         let mut page = self.heading(&format!("RELAY {index}"));
         let fence = self.fence(index);
-        let place = self
-            .places
-            .get(usize::from(index) - 1)
-            .map(|(place, _)| *place);
+        let rank = self.fleet.rank(index);
+        let place = rank.and_then(|rank| self.places.get(rank));
+        let place = place.map(|(place, _)| *place);
         match place {
+            None if rank.is_none() => page.push_str(
+                "place: spare, which waits beside the line, at least the minimum separation from all relays, until the leader calls it\n",
+            ),
             None => page.push_str("place: the relays find it in flight\n"),
             Some(at) => {
                 let Placement {
@@ -435,11 +447,11 @@ impl Bundle<'_> {
             fence.most_altitude_m
         );
         if let Some(flight) = self.simulated {
-            _ = writeln!(
-                page,
-                "room over the terrain: {}\n{ROOM}",
-                flight.room(index)
-            );
+            // The simulation numbers the relays of the chain without the spares.
+            if let Some(number) = rank.and_then(|it| u16::try_from(it + 1).ok()) {
+                let room = flight.room(number);
+                _ = writeln!(page, "room over the terrain: {room}\n{ROOM}");
+            }
             for line in flight.warnings() {
                 _ = writeln!(page, "warning: {line}");
             }
@@ -451,14 +463,17 @@ impl Bundle<'_> {
                 self.return_m(index)
             );
         }
-        let neighbour = |side| match (side, index) {
-            (Side::Upstream, 1) => "the transmitter".to_owned(),
-            (Side::Upstream, index) => format!("relay {}", index - 1),
-            (Side::Downstream, index) if index == self.uavs => "the receiver".to_owned(),
-            (Side::Downstream, index) => format!("relay {}", index + 1),
+        let before = self.fleet.first().take_while(|it| *it < index).last();
+        let after = self.fleet.first().find(|it| *it > index);
+        let named = |relay: Option<u16>, end: &str| {
+            relay.map_or_else(|| end.to_owned(), |it| format!("relay {it}"))
         };
-        let [before, after] = [Side::Upstream, Side::Downstream].map(neighbour);
-        _ = writeln!(page, "neighbours: {before} and {after}\n");
+        _ = writeln!(
+            page,
+            "neighbours: {} and {}\n",
+            named(before, "the transmitter"),
+            named(after, "the receiver")
+        );
         let (more, parameters) = match self.deployment.companion.positions {
             Some(_) => (" --no-autopilot", ""),
             None => (

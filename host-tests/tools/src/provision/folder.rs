@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 use uav_relay::{Placement, Profile};
 use uav_relay_scenario::Line;
+use uav_relay_scenario::fleet::FleetSize;
 
 use super::config::ADDRESS;
 
@@ -103,8 +104,8 @@ fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String
 pub struct Heading {
     /// Name of the scenario.
     pub scenario: String,
-    /// Number of relays in the chain.
-    pub uavs: u16,
+    /// Numbers of relays in the fleet and in the chain.
+    pub fleet: FleetSize,
     /// Network number of the relays.
     pub network: u16,
     /// Placement method of the relays, as named on the command line.
@@ -115,20 +116,29 @@ pub struct Heading {
 
 /// Returns the text of `summary.txt`: the flight, the expected positions, the commands for flashing.
 ///
-/// `places` are the positions that the relays agree on; empty if unknown. `line` converts them to latitude and
+/// `places` are the positions that the relays of the chain agree on; empty if unknown. `line` converts them to latitude and
 /// longitude.
 pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<&Line>) -> String {
     let Heading {
         scenario,
-        uavs,
+        fleet,
         network,
         method,
         signed,
     } = heading;
+    let FleetSize { relays, flying } = *fleet;
     let signed = if *signed { "signed" } else { "not signed" };
     let mut text = format!(
-        "{uavs} relays of {scenario}, network {network}, method {method}, frames {signed}\n\n"
+        "{relays} relays of {scenario}, network {network}, method {method}, frames {signed}\n\n"
     );
+    if flying < relays {
+        let spares: Vec<String> = fleet.spares().into_iter().map(name).collect();
+        _ = writeln!(
+            text,
+            "{flying} relays fly; spares at the start, which wait outside of the chain: {}\n",
+            spares.join(", ")
+        );
+    }
     if places.is_empty() {
         text.push_str("their positions are not known before the flight\n");
     } else {
@@ -143,7 +153,7 @@ pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<
             "          file       x [m]       y [m]      h [m]{earth}"
         );
     }
-    for (index, (place, _)) in (1..).zip(places) {
+    for (index, (place, _)) in fleet.first().zip(places) {
         _ = write!(
             text,
             "{:>14} {:>11.3} {:>11.3} {:>10.2}",
@@ -166,7 +176,7 @@ pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<
     text.push_str(
         "\ncommands to type in this folder, two for each drone, while that drone is connected to the debug probe:\n",
     );
-    for index in 1..=*uavs {
+    for index in 1..=relays {
         _ = writeln!(
             text,
             "probe-rs download --chip STM32F405RGTx --binary-format bin --base-address 0x{ADDRESS:08X} {}\n\

@@ -149,7 +149,7 @@ fn a_block_becomes_files_and_an_invalid_one_is_refused() {
     for (arguments, says) in [
         (
             &*format!("--board pico2 --block {}", path("short.bin")),
-            "has 7 bytes, but a block has 392",
+            "has 7 bytes, but a block has 396",
         ),
         ("--board pico3", "one of stm32f405"),
         ("--board pico2 --block nowhere.bin", "nowhere.bin"),

@@ -9,6 +9,7 @@ use uav_relay::field::FieldError;
 use uav_relay::flight::course::Course;
 use uav_relay::mission::MissionError;
 use uav_relay::{Adjust, ChannelLoad, Instant, Local, Measure, Method, Relay, Settings, Wiring};
+use uav_relay_scenario::fleet::FleetSize;
 use uav_relay_scenario::link::{Access, Link, RateModel};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::{ListenSpec, Scenario};
@@ -25,7 +26,7 @@ use super::{changed, example, field, in_a_field, paper, reads, with};
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
-    let mut bytes: Vec<u8> = b"UAVR\x0b\0\x88\x01\x03\0\x07\0\x05\0".to_vec();
+    let mut bytes: Vec<u8> = b"UAVR\x0c\0\x8c\x01\x03\0\x07\0\x05\0".to_vec();
     bytes.extend([method, u8::from(hold)]);
     for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
         bytes.extend(number.to_le_bytes());
@@ -45,6 +46,7 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
     bytes.extend(0_f32.to_le_bytes());
     bytes.extend(80_f32.to_le_bytes());
     bytes.extend(0_f32.to_le_bytes());
+    bytes.extend([0; 4]);
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes
@@ -113,6 +115,27 @@ fn the_silence_limit_is_in_the_block_and_the_settings() {
         settings,
         Settings::radio(115_200, ChannelLoad::of_radios(5))
     );
+}
+
+#[test]
+fn a_fleet_is_in_every_block() {
+    let flight = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
+    let usual = flight.block(4).unwrap();
+    let size = FleetSize {
+        relays: 5,
+        flying: 3,
+    };
+    let flight = flight.with_fleet(Some(size));
+    for (index, spare) in [(1, false), (2, false), (3, true), (4, false), (5, true)] {
+        let config = reads(&flight.block(index).unwrap()).unwrap();
+        assert_eq!((config.flying, config.spare), (3, spare), "{index}");
+    }
+    let block = flight.block(4).unwrap();
+    assert_eq!(block[8..388], usual[8..388]);
+    assert_eq!(block[388..392], [3, 0, 0, 0]);
+    assert_eq!(flight.block(5).unwrap()[388..392], [3, 0, 1, 0]);
+    let config = reads(&usual).unwrap();
+    assert_eq!((config.flying, config.spare), (0, false));
 }
 
 #[test]
@@ -298,6 +321,7 @@ fn a_number_out_of_range_is_named() {
         (352, &[1], ConfigError::Listen),
         (360, &[1], ConfigError::Listen),
         (368, &0.1_f32.to_le_bytes(), ConfigError::Listen),
+        (390, &[2, 0], ConfigError::Spare),
         // Values of a block without sites.
         (312, &1.0_f32.to_le_bytes(), ConfigError::Speed),
         (312, &(-0.0_f32).to_le_bytes(), ConfigError::Speed),

@@ -4,6 +4,7 @@
 
 mod block;
 mod command;
+mod fleet;
 mod parts;
 
 use std::path::{Path, PathBuf};

@@ -15,8 +15,8 @@ use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Placement, Sites};
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
-    Alarm, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine, Node,
-    Position, RelaySnapshot, Screen, Snapshot, Task, Tiles, Urgency,
+    Alarm, ChainSize, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine,
+    Node, Position, RelaySnapshot, Screen, Snapshot, Task, Tiles, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
@@ -234,6 +234,10 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
         snapshot.hops[1].sir_db = Some(8.0);
         snapshot.hops[1].sir_back_db = Some(-5.0);
         snapshot.no_fly.push(vec![[1e22, 0.0], [1e22, 1e22]]);
+        snapshot.chain_size = Some(ChainSize {
+            present: 3,
+            meant: 4,
+        });
         snapshot
     });
     let mut browser = shown.opened(1280, 900);
@@ -253,7 +257,10 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
         "{texts}"
     );
     let summary = browser.text("byId('summary').textContent");
-    assert!(summary.ends_with("worst hop 2 to 1: -5.0 dB"), "{summary}");
+    assert_eq!(
+        summary,
+        "3 relays in the chain, 4 are meant to fly; fleet of 5, none lost; worst hop 2 to 1: -5.0 dB"
+    );
     let off =
         browser.text("[...byId('rows').children].map((row) => row.children[5].textContent).join()");
     assert_eq!(off, "0.0,0.0,–,0.0,–,–");

@@ -132,8 +132,9 @@ const IMAGES: &[Image] = &[
         // - fitted slots: 5 KiB flash, 104 bytes RAM
         // - departures, spares, and motions that begin and end together: 6.75 KiB flash, 280 bytes RAM
         // - endurance: 4 KiB flash of this image, 1 KiB of the others with an autopilot; 180 bytes RAM
+        // - a configuration block that marks spares: 250 bytes flash
         // - states of refused setpoints and of nodes with another mission or key in reports: 1 KiB
-        [243 * 1024 + 512, 16_640, 7_168],
+        [244 * 1024, 16_640, 7_168],
     ),
 ];
 
