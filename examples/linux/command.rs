@@ -93,7 +93,7 @@ pub fn number([least, most]: [f32; 2], unit: &'static str) -> impl Parse<f32> {
     }
 }
 
-/// Parses one of several numbers in an option's value; `name` is its name in error messages, `unit` its unit.
+/// Parses one of several numbers in an option's value. Errors have its name `name` and its unit `unit`.
 ///
 /// # Errors
 /// A message with the name, the allowed range and the unit.

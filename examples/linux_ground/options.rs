@@ -85,7 +85,7 @@ pub(crate) struct Options {
     /// --altitude, --band, --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
     #[arg(long, requires = "version")]
     pub(crate) no_fence: bool,
-    /// Take values without an option from the mission loaded before flight, instead of from the mission in flight
+    /// Take values without an option from the mission loaded before flight, not from that in flight
     #[arg(long, requires = "version")]
     pub(crate) from_loaded: bool,
     /// Source of interference measurements at this end. A FIFO, a file whose last line counts, or a UDP port, `udp:PORT` or

@@ -12,7 +12,7 @@ use crate::simulator::traffic::TrafficSpec;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Data traffic")]
 pub struct Data {
-    /// Send packets through the chain: from Tx to Rx (forward, the default), or both ways, each in half of the time. They start at
+    /// Send packets through the chain: from Tx to Rx (forward, the default), or both ways. Each way has half of the time. They start at
     /// the first agreement. Every hop has its own data rate, by the table `link` of the scenario, and every node a queue. Reports
     /// predicted, offered and delivered data rates, delays and queue lengths. A run without --soak goes on for 1000 packets, and
     /// 30 more for each hop
@@ -21,7 +21,7 @@ pub struct Data {
     /// Bandwidth of one frequency, hertz, 1 to 1e12. The default is link.bandwidth_hz, or else noise.bandwidth_hz, of the scenario
     #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e12))]
     bandwidth_hz: Option<f64>,
-    /// Offered data rate, bit/s, 1e-3 to 1e12, each way; default: the predicted rate at the positions of the first agreement
+    /// Offered data rate, bit/s, 1e-3 to 1e12, each way. The default is the predicted rate at the positions of the first agreement
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-3, 1e12))]
     offer_bps: Option<f64>,
     /// Size of a packet, bytes, 1 to 1000000000; default 1500

@@ -35,7 +35,7 @@ pub struct Hostile {
     /// Relays 1 to K and the others do not receive each other from second S until T, or permanently. Repeatable
     #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
     partition: Vec<Partition>,
-    /// An attacker sends N forged frames, 1 to 100000: with guessed tags (signatures), altered, without tags, or with another key
+    /// An attacker sends N forged frames, 1 to 100000. They have guessed tags (signatures), altered bytes, no tags, or another key
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     forge: Option<u32>,
     /// An attacker sends N frames again that relays have sent before, 1 to 100000
@@ -285,7 +285,7 @@ pub struct Air {
     /// Larger values allow more relays on a slow channel
     #[arg(long, value_name = "MS", value_parser = whole(1_u64, 1_200_000))]
     probe_after_ms: Option<u64>,
-    /// Range of the radios on a shared channel: number of relays on each side that receive a frame, 1 to 1000; default 4
+    /// Range of the radios: number of relays on each side that receive a frame, 1 to 1000; default 4
     #[arg(long, value_name = "K", conflicts_with = "wires", value_parser = whole(1_usize, 1_000))]
     reach: Option<usize>,
     /// Mean length of a burst of losses, frames, 1 to 1e6 (Gilbert-Elliott). It is independent for each direction of a link; --loss
@@ -295,8 +295,8 @@ pub struct Air {
     /// Relay J does not receive relay I from second S until E, or permanently. Repeatable
     #[arg(long, value_name = "J:I@S[-E]", value_parser = deaf)]
     deaf: Vec<OneWayFailure>,
-    /// End the run after S seconds of virtual time, 1 to 1e6, and report the availability of the chain: the share of the time in
-    /// which the longest possible chain is at its best positions
+    /// End the run after S seconds of virtual time, 1 to 1e6, and report the chain's availability. This is the share of the time
+    /// in which the longest possible chain is at its best positions
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = soak)]
     soak: Option<Instant>,
 }

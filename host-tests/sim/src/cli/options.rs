@@ -28,7 +28,7 @@ pub struct Options {
     /// Planning method
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     pub method: Method,
-    /// Step of the target SIR in the methods align-step and stochastic-step, linear, 1e-6 to 1e6; default 0.1
+    /// Step of the target SIR in align-step and stochastic-step, linear, 1e-6 to 1e6; default 0.1
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
     pub epsilon: Option<f64>,
     /// Largest number of rounds of `adjust`, 1 to 65535; default 500
@@ -37,7 +37,8 @@ pub struct Options {
     /// Largest change of altitude in a round of `adjust`, m, 0 to 1e5; default 10
     #[arg(long = "explore", value_name = "M", allow_negative_numbers = true, value_parser = |text: &str| quantity(text, 0.0, 1e5, "m").map(narrow))]
     pub explore_m: Option<f32>,
-    /// Search in `adjust` on a grid of C positions along the line by R altitudes, 2 to 255 each, instead of from coarse to fine
+    /// Search in `adjust` on a grid of C positions along the line by R altitudes, 2 to 255 each. The default is a search from coarse
+    /// to fine
     #[arg(long, value_name = "CxR", value_parser = grid)]
     pub grid: Option<uav_relay::Local>,
     /// Repeat a stochastic run R times, 1 to 100: fly, measure the true field, and agree again. In the first run the relays assume the

@@ -16,7 +16,7 @@ use super::time::instant;
 /// Command-line options for missions that a ground station uploads during the run.
 #[derive(Args, Debug)]
 pub struct Uploads {
-    /// At second S of virtual time, upload the scenario's mission with changed values. Keys as in a scenario file: x_m, y_m
+    /// Upload the scenario's mission with changed values, at second S of virtual time. Keys as in a scenario file: x_m, y_m
     /// and power_w of the interferer, altitude_m, altitude_min_m, altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m,
     /// distance_m, tx_w, uav_w, rx_w; reverse and noise_w, 0 to 1; fitted_gap, 0 or 1 to 1000; and tolerance. If the scenario has
     /// sites, tx_lat_deg, tx_lon_deg and tx_amsl_m move Tx, and rx_lat_deg and so on Rx; the distance follows. Repeatable: the
@@ -29,7 +29,7 @@ pub struct Uploads {
     /// Discard uploads at a reboot: a rebooted relay starts with the scenario's mission
     #[arg(long)]
     no_store: bool,
-    /// End of the chain whose ground station requests the relays' reports, so that `cargo replay` can show the --capture
+    /// End of the chain whose ground station requests the relays' reports. `cargo replay` shows a --capture only with them
     #[arg(
         long,
         value_name = "END",
