@@ -261,11 +261,7 @@ impl Group {
             "blind" => format!("{who}: no position"),
             "restarted" => format!("{who}: autopilot restarted"),
             "offered" | "stored" | "adopted" => {
-                format!(
-                    "mission version {} {}",
-                    one.version.unwrap_or_default(),
-                    one.what
-                )
+                format!("mission {} {}", one.version.unwrap_or_default(), one.what)
             }
             other => other.to_owned(),
         }

@@ -114,8 +114,8 @@ fn an_upload_is_in_the_timeline_and_the_picture() {
         "interferer: 80 W, x = 800 m, y = -300 m",
         "interferer of the previous mission: 80 W, x = 500 m, y = 400 m",
         "|y| = 300 m",
-        "mission version 1 offered",
-        "mission version 1 adopted",
+        "mission 1 offered",
+        "mission 1 adopted",
         "1.5817 (1.99 dB)",
     ] {
         assert!(drawing.contains(words), "{words} in {drawing}");
