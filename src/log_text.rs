@@ -112,7 +112,7 @@ fn text(event: Event) -> defmt::Str {
         Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
         Event::MayLeaveTold { .. } => {
             defmt::intern!(
-                "has permission to leave; when its drone has left, report to this relay that the drone is gone"
+                "is outside of the chain, and has permission to leave: when its drone has left, report to this relay that the drone is gone"
             )
         }
         Event::MayLeave => {
@@ -120,8 +120,14 @@ fn text(event: Event) -> defmt::Str {
                 "the chain works without this relay now: this drone has permission to leave"
             )
         }
-        Event::EnduranceUnknown => defmt::intern!("unknown endurance: watch the battery"),
-        Event::AtReserve => defmt::intern!("battery at the reserve: fly this drone home"),
+        Event::EnduranceUnknown => {
+            defmt::intern!("remaining time of flight unknown: watch the battery")
+        }
+        Event::AtReserve => {
+            defmt::intern!(
+                "the battery lasts only for the way home and the reserve: fly this drone home"
+            )
+        }
         Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
     }
 }

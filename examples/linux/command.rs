@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use uav_relay_scenario::deployment::Deployment;
+use uav_relay_scenario::number::{brief, shortest};
 
 use crate::config::{self, FileOnlySettings, FileOptions};
 
@@ -34,7 +35,10 @@ pub fn one_line(error: &clap::Error) -> String {
     let text = error.to_string();
     let mut lines = text.lines().map(str::trim);
     let wrong: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
-    let line = wrong.join(" ").trim_start_matches("error: ").to_owned();
+    let mut line = wrong.join(" ").trim_start_matches("error: ").to_owned();
+    if let Some((value, names)) = line.split_once(" [possible values: ") {
+        line = format!("{value}: must be one of {}", names.trim_end_matches(']'));
+    }
     let meant = lines
         .filter(|line| line.starts_with("tip: ") && line.contains("similar"))
         .find_map(|line| {
@@ -74,20 +78,25 @@ pub fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Parse<T> {
     }
 }
 
-/// Returns the parser of a number in a range. The parser's error text names the range.
-pub fn number([least, most]: [f32; 2]) -> impl Parse<f32> {
+/// Returns the parser of a number in a range, in the unit `unit`. The parser's error text names the range and the unit.
+pub fn number([least, most]: [f32; 2], unit: &'static str) -> impl Parse<f32> {
     move |text: &str| {
         let value = text.trim().parse().ok();
         value
             .filter(|value| (least..=most).contains(value))
-            .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
+            .ok_or_else(|| {
+                let [least, most] = [least, most].map(|limit| brief(shortest(limit)));
+                format!("must be a number within {least} to {most} {unit}")
+                    .trim_end()
+                    .to_owned()
+            })
     }
 }
 
-/// Parses one of several numbers in an option's value; `name` is its name in error messages.
+/// Parses one of several numbers in an option's value. Errors have its name `name` and its unit `unit`.
 ///
 /// # Errors
-/// A message with the name and the allowed range.
-pub fn named(name: &str, text: &str, range: [f32; 2]) -> Result<f32, String> {
-    number(range)(text).map_err(|error| format!("{name} {error}"))
+/// A message with the name, the allowed range and the unit.
+pub fn named(name: &str, text: &str, range: [f32; 2], unit: &'static str) -> Result<f32, String> {
+    number(range, unit)(text).map_err(|error| format!("{name} {error}"))
 }

@@ -37,7 +37,7 @@ fn fitted_gap(text: &str) -> Result<f32, String> {
     if text == "0" {
         Ok(0.0)
     } else {
-        number(FITTED_GAP)(text)
+        number(FITTED_GAP, "")(text)
     }
 }
 
@@ -76,46 +76,46 @@ impl From<Method> for uav_relay::Method {
 #[derive(Args, Debug)]
 pub struct MissionOptions {
     /// Distance from transmitter to receiver, m, 1 to 1e6
-    #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = number(DISTANCE_M))]
+    #[arg(long, value_name = "M", default_value_t = 1000.0, allow_negative_numbers = true, value_parser = number(DISTANCE_M, "m"))]
     pub distance: f32,
     /// Altitude of every relay, m, 0.1 to 1e4
-    #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = number(ALTITUDE_M))]
+    #[arg(long, value_name = "M", default_value_t = 20.0, allow_negative_numbers = true, value_parser = number(ALTITUDE_M, "m"))]
     pub altitude: f32,
     /// Range of altitudes to choose from, m, 0.1 to 1e4, including --altitude; default: --altitude alone
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     pub band: Option<Band>,
     /// Left limit of the places that `joint` chooses, facing the receiver, as y in m, -1e5 to 0
-    #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(LEFT_M))]
+    #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(LEFT_M, "m"))]
     pub lateral_min: f32,
     /// Right limit of the places that `joint` chooses, facing the receiver, as y in m, 0 to 1e5
-    #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(RIGHT_M))]
+    #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(RIGHT_M, "m"))]
     pub lateral_max: f32,
     /// Power of the transmitter, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = number(POWER_W))]
+    #[arg(long, value_name = "W", default_value_t = 80.0, allow_negative_numbers = true, value_parser = number(POWER_W, "W"))]
     pub tx_power: f32,
     /// Power of every relay, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number(POWER_W))]
+    #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number(POWER_W, "W"))]
     pub uav_power: f32,
     /// Interferer: power (W, 1e-6 to 1e9) and position x, y (m, -1e7 to 1e7). x is toward the receiver, y to the
     /// right when facing it. `unknown` for relays that listen; default 80,500,400
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
     pub interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1
-    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W))]
+    #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W, "W"))]
     pub noise: f32,
     /// SIR that a hop needs toward the transmitter, relative to its SIR toward the receiver, 0 to 1. 0 means traffic
     /// toward the receiver only
-    #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(REVERSE))]
+    #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(REVERSE, ""))]
     pub reverse: f32,
     /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W, "W"))]
     pub rx_power: Option<f32>,
     /// SNR gap of fitted slots, linear, 1 to 1000; 0 for equal slots. With a gap each slot is as long as its hop
     /// needs, and `joint` chooses the places with the largest data rate
     #[arg(long, value_name = "G", default_value_t = 0.0, allow_negative_numbers = true, value_parser = fitted_gap)]
     pub fitted_gap: f32,
     /// Minimum distance between two relays, m, 0 to 1e5
-    #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = number(SEPARATION_M))]
+    #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = number(SEPARATION_M, "m"))]
     pub min_separation: f32,
 }
 
@@ -217,9 +217,9 @@ pub fn interferer(text: &str) -> Result<Interferer, String> {
         return Err("must be three numbers P,X,Y: the interferer's power P in W, and its position X along the line and Y beside it in m".to_owned());
     };
     Ok(Interferer {
-        power_w: named("P", power, [1e-6, 1e9])?,
-        x_m: named("X", x, [-1e7, 1e7])?,
-        y_m: named("Y", y, [-1e7, 1e7])?,
+        power_w: named("P", power, [1e-6, 1e9], "W")?,
+        x_m: named("X", x, [-1e7, 1e7], "m")?,
+        y_m: named("Y", y, [-1e7, 1e7], "m")?,
     })
 }
 
@@ -232,7 +232,7 @@ pub fn band(text: &str) -> Result<Band, String> {
         "must be two numbers LEAST,MOST: the lowest and the highest permitted altitude in m",
     )?;
     Ok(Band {
-        least_m: named("LEAST", least, ALTITUDE_M)?,
-        most_m: named("MOST", most, ALTITUDE_M)?,
+        least_m: named("LEAST", least, ALTITUDE_M, "m")?,
+        most_m: named("MOST", most, ALTITUDE_M, "m")?,
     })
 }

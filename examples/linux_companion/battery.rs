@@ -206,7 +206,7 @@ const fn refusal(departure: Departure) -> Option<&'static str> {
         Departure::NeedsGuard => "may not leave: drones not kept apart",
         Departure::NeedsChannel => "may not leave: needs a shared radio",
         Departure::NeedsQuorum => "may not leave: others lack a quorum",
-        Departure::WideGap => "may not leave: too many are absent",
+        Departure::WideGap => "may not leave: too many relays lost",
         Departure::Blocked => "may not leave: neighbours not linked",
         _ => return None,
     })

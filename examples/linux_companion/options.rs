@@ -38,7 +38,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "30", require_equals = true, value_parser = whole::<u64>(1, 3_600), help_heading = "Check")]
     pub(crate) check: Option<u64>,
     /// Largest distance of the drone from its planned place, m, 1 to 1e6
-    #[arg(long, value_name = "M", default_value_t = 500.0, requires = "check", allow_negative_numbers = true, value_parser = number([1.0, 1e6]), help_heading = "Check")]
+    #[arg(long, value_name = "M", default_value_t = 500.0, requires = "check", allow_negative_numbers = true, value_parser = number([1.0, 1e6], "m"), help_heading = "Check")]
     pub(crate) start_within: f32,
     /// The drone is not to be checked. Without this option a check without --autopilot is red
     #[arg(
@@ -48,7 +48,7 @@ pub(crate) struct Options {
         help_heading = "Check"
     )]
     pub(crate) no_autopilot: bool,
-    /// Number of this relay; 1 is next to the transmitter
+    /// Number of this relay, 1 (next to the transmitter) to N (next to the receiver)
     #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     index: u16,
     /// Number of relays, 1 to 1000
@@ -66,7 +66,7 @@ pub(crate) struct Options {
     /// Bit rate of every tty, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
     pub(crate) baud: u32,
-    /// Network number; frames of other networks are ignored
+    /// Network number, 0 to 65535; frames of other networks are ignored
     #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = whole::<u16>(0, 65_535))]
     network: u16,
     /// File with the network's key, 64 hexadecimal digits. Frames are signed, and unsigned ones are rejected
@@ -82,10 +82,10 @@ pub(crate) struct Options {
     /// flight. Remove it before another flight
     #[arg(long, value_name = "FILE")]
     pub(crate) view_file: Option<PathBuf>,
-    /// Milliseconds of silence before a neighbour is probed
+    /// Silence after which a neighbour is probed, ms, 1 to 3600000
     #[arg(long, value_name = "MS", default_value_t = 5_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     probe_after_ms: u64,
-    /// Milliseconds of silence before a neighbour counts as lost, more than --probe-after-ms
+    /// Silence after which a neighbour counts as lost, ms, up to 3600000, more than --probe-after-ms
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     dead_after_ms: u64,
     /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep
@@ -111,7 +111,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE", requires = "autopilot")]
     autopilot_key_file: Option<PathBuf>,
     /// Maximum speed of the drone, m/s, 0.1 to 20
-    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
+    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0], "m/s"))]
     speed: f32,
     /// Neighbour that a directional antenna points to. It points forward on the drone, so the targets have a heading.
     /// Without it the autopilot chooses the heading
@@ -121,7 +121,7 @@ pub(crate) struct Options {
     sites: SiteOptions,
     /// Maximum position error of a hovering drone, m, 0 to 1000. Two drones may come closer to each other than the
     /// separation by twice this error
-    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number([0.0, 1_000.0]))]
+    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number([0.0, 1_000.0], "m"))]
     position_error: f32,
     #[command(flatten)]
     mission: MissionOptions,
@@ -164,14 +164,14 @@ struct ListenOptions {
     following: bool,
     /// Time from an agreement to the next collection of measurements by the first relay, s, 0.01 to 1e5. Default 5,
     /// with --following 1
-    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e5]))]
+    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e5], "s"))]
     listen_every: Option<f32>,
-    /// Half-life of the weight of a measurement, s, 0.01 to 1e12. Default 60; with --following 16 divided by the
-    /// number of relays
-    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e12]))]
+    /// Half-life of the weight of a measurement, s, 0.01 to 1e12. Default 60 s; with --following 16 s divided by
+    /// the number of relays
+    #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e12], "s"))]
     listen_half_life: Option<f32>,
     /// Relative error of one measurement, 0.001 to 1; default 0.03, for a SiK radio rather 0.1
-    #[arg(long, value_name = "E", requires = "listen", allow_negative_numbers = true, value_parser = number([1e-3, 1.0]))]
+    #[arg(long, value_name = "E", requires = "listen", allow_negative_numbers = true, value_parser = number([1e-3, 1.0], ""))]
     listen_error: Option<f32>,
 }
 
@@ -198,17 +198,17 @@ pub(crate) struct BatteryOptions {
     /// Reserve of the remaining flight time, s, 0 to 3600. With it the relay asks to leave the chain by itself. It
     /// does so when the remaining time is the way home, this reserve and the time for its replacement. The last is
     /// twelve times --dead-after-ms, at most 240 s. Without this option the remaining time is only shown
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = number([0.0, 3_600.0], "s"))]
     reserve: Option<f32>,
     /// Shortest flight time with a full battery, s, 1 to 21600. It is for an autopilot that reports a percentage but
     /// no remaining time, as ArduCopter does. Without it such an endurance is unknown
-    #[arg(long, value_name = "S", requires = "autopilot", allow_negative_numbers = true, value_parser = number([1.0, 21_600.0]))]
+    #[arg(long, value_name = "S", requires = "autopilot", allow_negative_numbers = true, value_parser = number([1.0, 21_600.0], "s"))]
     flight_time: Option<f32>,
     /// Speed at which the autopilot returns home, m/s, 0.1 to 20
-    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
+    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0], "m/s"))]
     return_speed: f32,
     /// Mean speed at which the autopilot descends to land, m/s, 0.1 to 20
-    #[arg(long, value_name = "M/S", default_value_t = 1.5, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
+    #[arg(long, value_name = "M/S", default_value_t = 1.5, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0], "m/s"))]
     descent: f32,
     /// Wait outside of the chain as a spare until the leader calls this relay; only with --shared
     #[arg(long, requires = "shared")]
@@ -220,7 +220,7 @@ pub(crate) struct BatteryOptions {
     flying: Option<u16>,
     /// Duration of the motion to newly agreed positions, s, 0 to 3600, at most four times --dead-after-ms. All drones
     /// begin and arrive together, so that no hop is worse on the way. The same for all relays
-    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number([0.0, 3_600.0], "s"))]
     respacing: f32,
 }
 
@@ -506,8 +506,8 @@ fn field(text: &str) -> Result<Field, String> {
             .split_once(':')
             .ok_or("must be one or more points X:UPSILON, separated by commas: X is the position along the line in m, UPSILON the mean of 1 / interference power there in 1/W")?;
         Ok(FieldPoint {
-            x_m: named("X", x, [-1e7, 1e7])?,
-            upsilon_per_w: named("UPSILON", upsilon, [1e-9, 1e32])?,
+            x_m: named("X", x, [-1e7, 1e7], "m")?,
+            upsilon_per_w: named("UPSILON", upsilon, [1e-9, 1e32], "1/W")?,
         })
     };
     let points: Result<Vec<FieldPoint>, String> = text.split(',').map(point).collect();

@@ -232,7 +232,7 @@ impl Report {
             Event::MayLeaveTold { .. } => say(
                 "told",
                 format_args!(
-                    "{name} {toward} has permission to leave; when its drone has left, send the command `clear-lost` with its number"
+                    "{name} {toward} is outside of the chain, and has permission to leave; when its drone has left, send the command `clear-lost` with its number"
                 ),
             ),
             Event::NotHeard { .. } => say(
@@ -334,11 +334,12 @@ impl Report {
         // A drone keeps its number. Its place in the chain changes when a relay between it and Tx is lost.
         let (place, relays) = (relay.index(), relay.mission().relays());
         let view = relay.view().number();
+        let noun = if relays == 1 { "relay" } else { "relays" };
         self.log.event(
             now,
             "view accepted",
             json!({ "place": place, "relays": relays, "view": view }),
-            format_args!("the chain has {relays} relays; this relay is at place {place}, counted from the transmitter (view {view})"),
+            format_args!("the chain has {relays} {noun}; this relay is at place {place}, counted from the transmitter (view {view})"),
         );
     }
 

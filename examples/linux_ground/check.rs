@@ -74,7 +74,7 @@ impl Check {
         log.line(
             now,
             "check",
-            "relay  colour  control   position             neighbours  mission  faults",
+            "relay  colour  control   position x, y, h     neighbours  version  faults",
         );
         for (index, report, faults) in &rows {
             let colour = colour(faults.is_empty());

@@ -655,7 +655,7 @@ mod tests {
             ),
             (
                 r#"{"altitude": "0"}"#,
-                "must be a number within 0.1 to 10000.0",
+                "must be a number within 0.1 to 10000 m",
             ),
             (r#"{"altitude": "NaN"}"#, "must be a number within"),
             (r#"{"interferer": "80,700"}"#, "--new-interferer"),

@@ -19,7 +19,7 @@
 //! the page restart it with `--version` for an upload: it has no state to lose, and the relays recognise it by its first frames.
 //!
 //! Log lines have the format of `linux_companion`. Exit status: 0 once the chain flies the new mission, or after Ctrl-C or
-//! SIGTERM with `--stand`; 1 if the upload fails or it can not start; 2 if the options are wrong.
+//! SIGTERM with `--stand`; 1 if the upload fails or it cannot start; 2 if the options are wrong.
 //!
 //! | file | content |
 //! | --- | --- |

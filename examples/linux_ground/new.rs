@@ -29,36 +29,36 @@ pub(crate) struct NewOptions {
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_tx", allow_hyphen_values = true, value_parser = site)]
     new_site_rx: Option<Geodetic>,
     /// New distance from transmitter to receiver, m, 1 to 1e6
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(DISTANCE_M))]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(DISTANCE_M, "m"))]
     new_distance: Option<f32>,
     /// New altitude of every relay, m, 0.1 to 1e4
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(ALTITUDE_M))]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(ALTITUDE_M, "m"))]
     new_altitude: Option<f32>,
     /// New range of altitudes to choose from, m, 0.1 to 1e4. Default: the present range, or the new altitude alone if the present
     /// range is a single one
     #[arg(long, value_name = "LEAST,MOST", allow_hyphen_values = true, value_parser = band)]
     new_band: Option<Band>,
     /// New left limit of the relays' positions, facing the receiver, as y in m, -1e5 to 0
-    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = number(LEFT_M))]
+    #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = number(LEFT_M, "m"))]
     new_lateral_min: Option<f32>,
     /// New right limit of the relays' positions, facing the receiver, as y in m, 0 to 1e5
-    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = number(RIGHT_M))]
+    #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = number(RIGHT_M, "m"))]
     new_lateral_max: Option<f32>,
     /// New power of the transmitter, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W, "W"))]
     new_tx_power: Option<f32>,
     /// New power of every relay, W, 1e-6 to 1e6
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W, "W"))]
     new_uav_power: Option<f32>,
     /// New interferer: power (W, 1e-6 to 1e9) and position (m, -1e7 to 1e7). The position is along the line to the receiver, and to
     /// the right of it
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = interferer)]
     new_interferer: Option<Interferer>,
     /// New noise power at every receiver, W, 0 to 1
-    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(NOISE_W))]
+    #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(NOISE_W, "W"))]
     new_noise: Option<f32>,
     /// New minimum distance between two relays, m, 0 to 1e5
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(SEPARATION_M))]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = number(SEPARATION_M, "m"))]
     new_min_separation: Option<f32>,
 }
 
@@ -160,7 +160,7 @@ impl NewOptions {
                     "receiver at y {y_m} m: must be 0 m, because the mission has no sites (positions of Tx and Rx on earth), so the receiver can only move along the line from Tx to Rx"
                 ));
             }
-            let distance_m = number(DISTANCE_M)(&x_m.to_string());
+            let distance_m = number(DISTANCE_M, "m")(&x_m.to_string());
             return Ok(Self {
                 new_distance: Some(
                     distance_m.map_err(|why| format!("receiver at x {x_m} m: {why}"))?,

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{ArgAction, CommandFactory as _, Parser, ValueEnum};
+use clap::{ArgAction, ArgGroup, CommandFactory as _, Parser, ValueEnum};
 use uav_relay::UploadError;
 use uav_relay::{Duration, Side, Sites, Wiring};
 use uav_relay_linux::command::{self, whole};
@@ -22,9 +22,10 @@ use crate::new::NewOptions;
 /// Transmitter or receiver end of a chain of relays in flight. Uploads a new mission, or keeps answering the relays (--stand). The
 /// options up to --min-separation describe the mission loaded into the relays; those that begin with --new- change it. All other
 /// values stay as the chain flies them: the chain is asked first. The changes, and the distance that each relay moves, are shown
-/// and must be confirmed before the upload. The number of relays can not change
+/// and must be confirmed before the upload. The number of relays cannot change
 #[derive(Parser, Debug)]
 #[command(name = "linux_ground", version, disable_version_flag = true)]
+#[command(group = ArgGroup::new("task").args(["version", "stand", "check"]).required(true).multiple(true))]
 #[expect(clippy::struct_excessive_bools, reason = "one for each option")]
 pub(crate) struct Options {
     /// TOML file with the loaded scenario, and the sections `network` and `ground`. Options of the command line override it
@@ -42,7 +43,7 @@ pub(crate) struct Options {
     /// Bit rate of the tty, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
     pub(crate) baud: u32,
-    /// Network number
+    /// Network number, 0 to 65535; frames of other networks are ignored
     #[arg(long, value_name = "W", default_value_t = NETWORK, allow_negative_numbers = true, value_parser = whole::<u16>(0, 65_535))]
     pub(crate) network: u16,
     /// File with the network's key, 64 hexadecimal digits
@@ -52,14 +53,14 @@ pub(crate) struct Options {
     /// relay
     #[arg(long, value_name = "FILE")]
     pub(crate) epoch_file: PathBuf,
-    /// Version of the new mission, 1 to 65535: larger than that of every earlier upload. As the last word, without V, it prints
-    /// the program's version
-    #[arg(long, value_name = "V", required_unless_present_any = ["stand", "check"], allow_negative_numbers = true, value_parser = whole::<u16>(1, 65_535))]
+    /// Upload the new mission as this version, 1 to 65535: larger than that of every earlier upload. As the last word, without V,
+    /// it prints the program's version
+    #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = whole::<u16>(1, 65_535))]
     pub(crate) version: Option<u16>,
     /// Print the version of the program
     #[arg(short = 'V', action = ArgAction::Version)]
     own_version: Option<bool>,
-    /// Seconds until an upload is given up, 1 to 86400. With --stand the failure is logged and the program goes on
+    /// Time after which an unfinished upload is given up, s, 1 to 86400. With --stand the failure is logged and the program goes on
     #[arg(long, value_name = "S", default_value_t = 300, allow_negative_numbers = true, value_parser = whole::<u64>(1, 86_400))]
     pub(crate) timeout: u64,
     /// Number of relays, 1 to 1000
@@ -73,7 +74,7 @@ pub(crate) struct Options {
     loaded: MissionOptions,
     #[command(flatten)]
     sites: SiteOptions,
-    /// Method of the relays for finding positions, as given to the first relay. Used for the forecast of their moves
+    /// Method by which the relays find positions, as given to the first relay. It is only used to compute their moves in advance
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
     #[command(flatten)]
@@ -84,12 +85,11 @@ pub(crate) struct Options {
     /// Upload without confirmation; required if standard input is no terminal
     #[arg(long, requires = "version")]
     pub(crate) yes: bool,
-    /// Upload missions outside the geofence, too, for relays without a drone, which have none. The geofence is that of --altitude,
-    /// --band,
-    /// --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
+    /// Upload missions outside the geofence, too, for relays without a drone, which have no geofence. The geofence is that of
+    /// --altitude, --band, --lateral-min-m, --lateral-max-m and --distance; relays that fly a drone refuse such a mission
     #[arg(long, requires = "version")]
     pub(crate) no_fence: bool,
-    /// Take values that are not given from the loaded mission instead of the mission in flight
+    /// Take values without an option from the mission loaded before flight, not from that in flight
     #[arg(long, requires = "version")]
     pub(crate) from_loaded: bool,
     /// Source of interference measurements at this end. A FIFO, a file whose last line counts, or a UDP port, `udp:PORT` or
@@ -103,7 +103,7 @@ pub(crate) struct Options {
     )]
     pub(crate) measurements: Option<String>,
     /// Keep running until a signal: answer the relays, report measurements, and log which relays answer. With --version upload
-    /// that mission first
+    /// the new mission first
     #[arg(long, help_heading = "Standing")]
     pub(crate) stand: bool,
     /// Check the chain before flight, for at most S seconds, 1 to 3600; 60 by default. Prints a table of the relays, and exits with status

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use uav_relay::{ChannelLoad, Duration};
+use uav_relay_scenario::number::brief;
 
 /// Maximum of `--baud`, bit/s.
 pub const MOST_BAUD: u32 = 10_000_000;
@@ -137,18 +138,28 @@ pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<()
         .map_err(|full| format!("--baud {baud}: {full}"))
 }
 
-/// Parses a number in the range `least` to `most`.
+/// Parses a number without a unit in the range `least` to `most`.
 ///
 /// # Errors
 /// The text is not a number in this range; the message states the range.
 pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    let range = || format!("must be a number within {least:?} to {most:?}");
-    let value: f64 = text.parse().map_err(|_| range())?;
-    if (least..=most).contains(&value) {
-        Ok(value)
-    } else {
-        Err(range())
-    }
+    quantity(text, least, most, "")
+}
+
+/// Parses a number in the range `least` to `most`, in the unit `unit`, for example `m/s`.
+///
+/// # Errors
+/// The text is not a number in this range; the message states the range and the unit.
+pub fn quantity(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
+    let value: Option<f64> = text.parse().ok();
+    value
+        .filter(|value| (least..=most).contains(value))
+        .ok_or_else(|| {
+            let [least, most] = [least, most].map(brief);
+            format!("must be a number within {least} to {most} {unit}")
+                .trim_end()
+                .to_owned()
+        })
 }
 
 /// Returns a parser for whole numbers in the range `least` to `most`.

@@ -104,7 +104,7 @@ fn put(file: &Path, excerpt: &str) -> Result<(), Failure> {
 }
 
 fn read(file: &Path) -> Result<Results, Failure> {
-    let text = std::fs::read_to_string(file).map_err(|error| error.to_string());
+    let text = std::fs::read_to_string(file).map_err(|error| format!("cannot be read: {error}"));
     let results =
         text.and_then(|text| serde_json::from_str(&text).map_err(|error| error.to_string()));
     results.map_err(|error| Failure::input(format!("--from {}: {error}", file.display())))

@@ -68,6 +68,13 @@ function list(told) {
 /** Phrases for the kinds of events that need more words beside a relay's number. */
 const PHRASES = {
   "silent": "went silent",
+  "switched on": "rebooted",
+  "does not receive": "does not receive relay",
+  "receives again": "receives again relay",
+  "told to leave": "permits to leave, outside of the chain: relay",
+  "may leave": "has permission to leave",
+  "mission mismatch": "received another mission from relay",
+  "duplicate index": "found another node with the number",
   "lost": "lost relay",
   "found": "became a neighbour of relay",
   "no quorum": "too few relays receive each other (no quorum), position held",

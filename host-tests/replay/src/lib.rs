@@ -70,7 +70,7 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
                 loaded(&scenario, relays, digest).map_err(|why| format!("{name}: {why}"))?;
             let loaded = loaded.ok_or_else(|| {
                 let flown = digest.unwrap_or_default();
-                format!("{name}: its mission of {relays} relays is not the one that the chain loaded (digest {flown:04x})")
+                format!("{name}: its mission of {relays} relays is not the one that the chain loaded (digest 0x{flown:04x})")
             })?;
             Some(Loaded {
                 flying: sections.fleet.flying,

@@ -298,7 +298,7 @@ pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {
                 ErrorKind::IsADirectory => Problem::Directory,
                 kind => Problem::Unreadable(kind),
             };
-            fail(problem, None, "a readable TOML file")
+            fail(problem, None, "the name of a readable TOML file")
         })?;
     if bytes.len() as u64 > LONGEST {
         return Err(fail(

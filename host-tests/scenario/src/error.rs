@@ -144,7 +144,11 @@ impl fmt::Display for ScenarioError {
             (Some(part), None) | (None, Some(part)) => format!("{part} "),
             (None, None) => String::new(),
         };
-        let line = format!("{file}: {what}{problem}; allowed: {allowed}");
+        let word = match problem {
+            Problem::NoSuchFile | Problem::Directory | Problem::Unreadable(_) => "give",
+            _ => "allowed:",
+        };
+        let line = format!("{file}: {what}{problem}; {word} {allowed}");
         f.write_str(&one_line(&line))
     }
 }

@@ -11,9 +11,9 @@ use uav_relay::{Geodetic, Placement};
 use super::area::{Area, NoFly, SourceArea};
 use super::check::{internal_mismatch, mistake};
 use super::error::{Problem, ScenarioError};
-use super::keys::{MOST_CORNERS, number};
+use super::keys::MOST_CORNERS;
 use super::link::{Access, Link, RateModel, RateStep};
-use super::number::{factor, watts};
+use super::number::{brief, factor, watts};
 use super::spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, Planned,
     PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source, TerrainSpec,
@@ -225,11 +225,11 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     let altitude_min_m = geometry.altitude_min_m.unwrap_or(altitude_m);
     let altitude_max_m = geometry.altitude_max_m.unwrap_or(altitude_m);
     let band = |key: &str, value, side: &str| {
-        let allowed = format!("at {side} altitude_m, {} m", number(altitude_m));
+        let allowed = format!("at {side} altitude_m, {} m", brief(altitude_m));
         Err(mistake(
             file,
             key,
-            Some(number(value)),
+            Some(brief(value)),
             Problem::OutOfRange,
             allowed,
         ))
@@ -324,9 +324,9 @@ fn terrain(file: &str, raw: &RawTerrain, has_site: bool) -> Result<TerrainSpec, 
         return Err(mistake(
             file,
             "terrain.above_ground_max_m",
-            Some(number(most)),
+            Some(brief(most)),
             Problem::OutOfRange,
-            format!("at least above_ground_m, {} m", number(least)),
+            format!("at least above_ground_m, {} m", brief(least)),
         ));
     }
     Ok(TerrainSpec {
@@ -357,7 +357,7 @@ fn reverse(file: &str, reverse: Option<f64>) -> Result<f64, ScenarioError> {
         return Err(mistake(
             file,
             "link.reverse",
-            Some(number(reverse)),
+            Some(brief(reverse)),
             Problem::OutOfRange,
             format!("0.0, or {LEAST_REVERSE:e} to 1.0"),
         ));
@@ -373,11 +373,11 @@ fn data_link(file: &str, raw: RawDataLink, noise_hz: Option<f64>) -> Result<Link
         return Err(mistake(
             file,
             "link.bandwidth_hz",
-            Some(number(own)),
+            Some(brief(own)),
             Problem::OtherBandwidth,
             format!(
                 "{} Hz (noise.bandwidth_hz), or only one of the two keys",
-                number(noise)
+                brief(noise)
             ),
         ));
     }
@@ -397,11 +397,11 @@ fn data_link(file: &str, raw: RawDataLink, noise_hz: Option<f64>) -> Result<Link
                 return Err(mistake(
                     file,
                     &format!("link.steps[{index}].{key}"),
-                    Some(number(here)),
+                    Some(brief(here)),
                     Problem::Unsorted,
                     format!(
                         "above {} (the {key} of the previous entry) to {most}",
-                        number(before)
+                        brief(before)
                     ),
                 ));
             }
@@ -446,7 +446,7 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
             nlos,
             format!(
                 "{} dB (the value of excess_loss_los_db) to 200 dB",
-                number(los)
+                brief(los)
             ),
         ),
         None => (
@@ -454,14 +454,14 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
             los,
             format!(
                 "0 to {} dB (the upper limit is the default of excess_loss_nlos_db)",
-                number(nlos)
+                brief(nlos)
             ),
         ),
     };
     Err(mistake(
         file,
         key,
-        Some(number(value)),
+        Some(brief(value)),
         Problem::OutOfRange,
         allowed,
     ))
@@ -517,12 +517,12 @@ fn interference(
                     let key = format!("field.beta[{index}].x_m");
                     let allowed = format!(
                         "above {} (the x_m of the previous entry) to 1e7 m",
-                        number(before.x_m)
+                        brief(before.x_m)
                     );
                     return Err(mistake(
                         file,
                         &key,
-                        Some(number(here.x_m)),
+                        Some(brief(here.x_m)),
                         Problem::Unsorted,
                         allowed,
                     ));
@@ -644,7 +644,7 @@ pub(super) fn line(
             Err(mistake(
                 file,
                 "geometry.distance_m",
-                Some(number(given)),
+                Some(brief(given)),
                 Problem::OtherDistance,
                 allowed,
             ))
@@ -752,10 +752,10 @@ impl GivenPower<'_> {
         let (antenna, gain) = self.gain;
         let said = format!(
             "{} with {antenna} = {}, an EIRP of {eirp_w:.3e} W,",
-            number(given.unwrap_or_default()),
-            number(gain.unwrap_or_default())
+            brief(given.unwrap_or_default()),
+            brief(gain.unwrap_or_default())
         );
-        let allowed = format!("an EIRP of {} to {} W", number(least), number(most));
+        let allowed = format!("an EIRP of {} to {} W", brief(least), brief(most));
         let key = format!("{}{key}", self.table);
         Err(mistake(
             file,
@@ -871,7 +871,7 @@ fn source_areas(
         let Some(given) = &raw.area else {
             for (key, power) in powers {
                 if let Some(RawPowers::Range([low, high])) = power {
-                    let value = format!("[{}, {}]", number(low), number(high));
+                    let value = format!("[{}, {}]", brief(low), brief(high));
                     let allowed =
                         "one number; or a range, if the key area is also given".to_owned();
                     let key = format!("{table}{key}");
@@ -891,7 +891,7 @@ fn source_areas(
         for (site, x_m) in [("Tx", 0.0), ("Rx", room.distance_m)] {
             let apart_m = area.distance_m([x_m, 0.0]);
             if apart_m < LEAST_APART_M {
-                let value = format!("with {site} (x = {} m, y = 0)", number(x_m));
+                let value = format!("with {site} (x = {} m, y = 0)", brief(x_m));
                 let allowed = format!(
                     "an area at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} reduces the SIR there to 0; this one is {apart_m:.4} m from {site}"
                 );
@@ -1027,7 +1027,7 @@ fn no_fly(
                 Some(high) => (
                     "highest_m",
                     high,
-                    format!("above lowest_m, {} m", number(low)),
+                    format!("above lowest_m, {} m", brief(low)),
                 ),
                 None => (
                     "lowest_m",
@@ -1039,7 +1039,7 @@ fn no_fly(
             return Err(mistake(
                 file,
                 &key,
-                Some(number(value)),
+                Some(brief(value)),
                 Problem::OutOfRange,
                 allowed,
             ));
@@ -1181,7 +1181,7 @@ pub(super) fn sources(
             if apart_m < LEAST_APART_M && raw.area.is_none() {
                 let (key, value) = match (raw.lat_deg, raw.lon_deg) {
                     (Some(lat), Some(lon)) => ("lat_deg", format!("{lat}, lon_deg = {lon}")),
-                    _ => ("x_m", format!("{}, y_m = {}", number(x_m), number(y_m))),
+                    _ => ("x_m", format!("{}, y_m = {}", brief(x_m), brief(y_m))),
                 };
                 let allowed = format!(
                     "a position at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} reduces the SIR there to 0; this one is {apart_m:.4} m from {site}"
@@ -1238,7 +1238,7 @@ fn on_earth(
         if off_db > MAX_HEIGHT_ERROR_DB {
             let value = format!(
                 "{}, {above_m:.1} m above the straight line from Tx to Rx,",
-                number(amsl_m)
+                brief(amsl_m)
             );
             let allowed = format!(
                 "no amsl_m, or a height that changes the interference by at most {MAX_HEIGHT_ERROR_DB} dB everywhere; \

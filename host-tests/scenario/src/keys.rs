@@ -9,6 +9,7 @@ use toml::Table;
 
 use super::endpoint::FORM;
 use super::link::Access;
+use super::number::brief;
 use super::spec::PlannedMethod;
 
 /// Range of a number in a scenario file: `low` to `high`.
@@ -367,15 +368,6 @@ impl Range {
     }
 }
 
-pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if size > 0.0 && !(1e-3..1e5).contains(&size) {
-        format!("{value:e}")
-    } else {
-        format!("{value}")
-    }
-}
-
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let gap = if self.unit.is_empty() { "" } else { " " };
@@ -383,8 +375,8 @@ impl fmt::Display for Range {
         write!(
             f,
             "{low}{} to {}{gap}{}",
-            number(self.low),
-            number(self.high),
+            brief(self.low),
+            brief(self.high),
             self.unit
         )
     }

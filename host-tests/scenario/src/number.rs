@@ -1,4 +1,4 @@
-//! Conversion of numbers: f64 of files to f32 of relays and back, decibels to factors.
+//! Conversion of numbers: f64 of files to f32 of relays and back, decibels to factors; numbers as text.
 
 /// Returns the f32 nearest to `value`. Relays compute in f32.
 #[expect(
@@ -15,6 +15,17 @@ pub fn narrow(value: f64) -> f32 {
 #[must_use]
 pub fn shortest(value: f32) -> f64 {
     format!("{value}").parse().unwrap_or_else(|_| value.into())
+}
+
+/// Formats a number in few characters: from 100000 and below 0.001 with an exponent, as in 1e6.
+#[must_use]
+pub fn brief(value: f64) -> String {
+    let size = value.abs();
+    if size > 0.0 && !(1e-3..1e5).contains(&size) {
+        format!("{value:e}")
+    } else {
+        format!("{value}")
+    }
 }
 
 /// Converts decibels `db` to a linear ratio of powers.

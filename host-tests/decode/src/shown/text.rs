@@ -101,7 +101,7 @@ fn value_text(field: &Field, value: &Value<'_>) -> String {
     match value {
         Value::Unsigned(number) => scaled(field, number.to_string(), *number as f64),
         Value::Signed(number) => scaled(field, number.to_string(), *number as f64),
-        Value::Digest(digest) => format!("{digest:04x}"),
+        Value::Digest(digest) => format!("0x{digest:04x}"),
         Value::View(0) => "0".to_owned(),
         Value::View(view) => format!("{} by node {}", view >> 10, view & 0x3FF),
         Value::Single(number) => format!("{number:?}"),

@@ -9,7 +9,7 @@ fn the_first_example_is_decoded_with_field_names() {
     let text = lines(&[], &super::HEARTBEAT).join("\n");
     let wanted = "\
 frame 1  Heartbeat  1 -> 2  network 7  counter 0  23 bytes
-    mission            5a3c                      digest of the sender's mission as loaded before flight
+    mission            0x5a3c                    digest of the sender's mission as loaded before flight
     request            5                         number of the sender's request; 0 for none
     reply              0                         number of the answered request; 0 for none";
     assert_eq!(text, wanted);

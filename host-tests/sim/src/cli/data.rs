@@ -12,16 +12,16 @@ use crate::simulator::traffic::TrafficSpec;
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Data traffic")]
 pub struct Data {
-    /// Send packets through the chain: from Tx to Rx (forward, the default), or both ways. They start at the first agreement; both
-    /// ways have half of the time each. Every hop has its own data rate, by the data link of the scenario (link), and every node a queue. Reports promised,
-    /// offered and delivered data rates, delays and queue lengths. A run that ends by itself goes on for 1000 packets, and 30 more
-    /// for each hop
+    /// Send packets through the chain: from Tx to Rx (forward, the default), or both ways. Each way has half of the time. They start at
+    /// the first agreement. Every hop has its own data rate, by the table `link` of the scenario, and every node a queue. Reports
+    /// predicted, offered and delivered data rates, delays and queue lengths. A run without --soak goes on for 1000 packets, and
+    /// 30 more for each hop
     #[arg(long, value_name = "WAY", value_enum, num_args = 0..=1, default_missing_value = "forward")]
     traffic: Option<Way>,
     /// Bandwidth of one frequency, hertz, 1 to 1e12. The default is link.bandwidth_hz, or else noise.bandwidth_hz, of the scenario
     #[arg(long, value_name = "B", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e12))]
     bandwidth_hz: Option<f64>,
-    /// Offered data rate, bit/s, 1e-3 to 1e12, each way; default: the promised rate of the first agreement
+    /// Offered data rate, bit/s, 1e-3 to 1e12, each way. The default is the predicted rate at the positions of the first agreement
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-3, 1e12))]
     offer_bps: Option<f64>,
     /// Size of a packet, bytes, 1 to 1000000000; default 1500

@@ -9,7 +9,7 @@ use uav_relay::{Duration, GuardConfig, Instant, Sites, Wiring};
 use super::rotation::Rotation;
 use super::time::{instant, span};
 use super::upload::Uploads;
-use crate::command::{Failure, carries, number, whole};
+use crate::command::{Failure, carries, quantity, whole};
 use crate::report::seconds;
 use crate::simulator::attack::Attack;
 use crate::simulator::drones::{BIAS_M, GUST_MPS, HOVER_M, NOISE_M, Point};
@@ -35,10 +35,10 @@ pub struct Hostile {
     /// Relays 1 to K and the others do not receive each other from second S until T, or permanently. Repeatable
     #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
     partition: Vec<Partition>,
-    /// An attacker sends N forged frames, 1 to 100000. With guessed tags, altered, without tags, with another key
+    /// An attacker sends N forged frames, 1 to 100000. They have guessed tags (signatures), altered bytes, no tags, or another key
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     forge: Option<u32>,
-    /// An attacker replays N received frames, 1 to 100000
+    /// An attacker sends N frames again that relays have sent before, 1 to 100000
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1_u32, 100_000))]
     replay: Option<u32>,
     #[command(flatten)]
@@ -49,7 +49,7 @@ pub struct Hostile {
     /// Send unsigned frames, even with an attacker; excludes uploads
     #[arg(long)]
     no_auth: bool,
-    /// Connect all relays by one radio channel, which reaches four relays far. Default with any of --kill, --boot, --partition,
+    /// Connect all relays by one radio channel. A frame reaches the four nearest relays on each side (--reach). Default with any of --kill, --boot, --partition,
     /// --deaf, --soak, --air, --fly, --forge, --replay and --upload
     #[arg(long, conflicts_with = "wires")]
     shared: bool,
@@ -112,8 +112,9 @@ impl Hostile {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
                 let line = format!(
-                    "{name} {}@..: the relay's number must be within 1 to {uavs}",
-                    one.index
+                    "{name} {}@{}: the relay's number must be within 1 to {uavs}",
+                    one.index,
+                    seconds(one.at)
                 );
                 return Err(Failure::input(line));
             }
@@ -125,11 +126,11 @@ impl Hostile {
             .iter()
             .find(|part| !(1..uavs).contains(&part.after))
         {
-            let after = part.after;
+            let option = format!("--partition {}@{}", part.after, seconds(part.from));
             let line = match uavs {
-                1 => format!("--partition {after}@..: one relay alone cannot be partitioned"),
+                1 => format!("{option}: one relay alone cannot be partitioned"),
                 _ => format!(
-                    "--partition {after}@..: the relay's number must be within 1 to {}",
+                    "{option}: the relay's number must be within 1 to {}",
                     uavs - 1
                 ),
             };
@@ -274,7 +275,7 @@ fn partition(text: &str) -> Result<Partition, String> {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Links and the radio channel")]
 pub struct Air {
-    /// Access method of the shared channel, which reaches four relays far; default csma
+    /// Access method of a radio channel that all relays share, as with --shared; default csma
     #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
     sharing: Option<Sharing>,
     /// Bits per second of every link or of the channel, 300 to 10000000; a byte takes ten bits
@@ -284,17 +285,18 @@ pub struct Air {
     /// Larger values allow more relays on a slow channel
     #[arg(long, value_name = "MS", value_parser = whole(1_u64, 1_200_000))]
     probe_after_ms: Option<u64>,
-    /// Range of the radios on a shared channel, in relays, 1 to 1000; default 4
+    /// Range of the radios: number of relays on each side that receive a frame, 1 to 1000; default 4
     #[arg(long, value_name = "K", conflicts_with = "wires", value_parser = whole(1_usize, 1_000))]
     reach: Option<usize>,
     /// Mean length of a burst of losses, frames, 1 to 1e6 (Gilbert-Elliott). It is independent for each direction of a link; --loss
-    /// P is the mean share of lost frames. 1 for independent losses, otherwise at least 1 / (1 - P)
-    #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| number(text, 1.0, 1e6))]
+    /// P is the mean share of lost frames. L is 1 for independent losses, otherwise at least 1 / (1 - P)
+    #[arg(long, value_name = "L", default_value_t = 1.0, allow_negative_numbers = true, value_parser = |text: &str| quantity(text, 1.0, 1e6, "frames"))]
     burst: f64,
     /// Relay J does not receive relay I from second S until E, or permanently. Repeatable
     #[arg(long, value_name = "J:I@S[-E]", value_parser = deaf)]
     deaf: Vec<OneWayFailure>,
-    /// Run for S seconds, 1 to 1e6, with all events, and report the availability of the chain
+    /// End the run after S seconds of virtual time, 1 to 1e6, and report the chain's availability. This is the share of the time
+    /// in which the longest possible chain is at its best positions
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = soak)]
     soak: Option<Instant>,
 }
@@ -327,7 +329,10 @@ impl Air {
 
     /// Returns each `--deaf` option as text, for error messages, and the start of its failure.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
-        let name = |deaf: &OneWayFailure| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
+        let name = |deaf: &OneWayFailure| {
+            let OneWayFailure { by, of, from, .. } = deaf;
+            (format!("--deaf {by}:{of}@{}", seconds(*from)), *from)
+        };
         self.deaf.iter().map(name)
     }
 
@@ -345,9 +350,10 @@ impl Air {
         let wrong = self.deaf.iter().find(|deaf| {
             !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
         });
-        if let Some(OneWayFailure { by, of, .. }) = wrong {
+        if let Some(OneWayFailure { by, of, from, .. }) = wrong {
             let line = format!(
-                "--deaf {by}:{of}@..: the numbers of both relays must be within 1 to {uavs}"
+                "--deaf {by}:{of}@{}: the numbers of both relays must be within 1 to {uavs}",
+                seconds(*from)
             );
             return Err(Failure::input(line));
         }
@@ -422,8 +428,8 @@ fn deaf(text: &str) -> Result<OneWayFailure, String> {
 }
 
 fn soak(text: &str) -> Result<Instant, String> {
-    number(text, 1.0, 1e6)?;
-    instant(text).ok_or_else(|| "must be a number within 1.0 to 1e6".to_owned())
+    quantity(text, 1.0, 1e6, "s")?;
+    instant(text).ok_or_else(|| "must be a number within 1 to 1e6 s".to_owned())
 }
 
 /// Command-line options for simulated drones, their pilots and autopilots.
@@ -461,7 +467,10 @@ impl Flight {
 
     /// Returns each `--takeover` option as text, for error messages, and the start of the takeover.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
-        let name = |it: &Takeover| (format!("--takeover {}", it.relay), it.from);
+        let name = |it: &Takeover| {
+            let text = format!("--takeover {}@{}", it.relay, seconds(it.from));
+            (text, it.from)
+        };
         self.takeover.iter().map(name)
     }
 
@@ -474,15 +483,16 @@ impl Flight {
 
     /// Rejects `--takeover` without `--fly`, or of a drone that a chain of `uavs` relays does not have.
     pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
-        if let (false, Some(Takeover { relay, .. })) = (self.fly, self.takeover.first()) {
-            let line = format!("--takeover {relay}@..: has no effect without --fly");
+        if let (false, Some((option, _))) = (self.fly, self.begins().next()) {
+            let line = format!("{option}: has no effect without --fly");
             return Err(Failure::input(line));
         }
         let wrong = |takeover: &&Takeover| !(1..=uavs).contains(&takeover.relay);
         match self.takeover.iter().find(wrong) {
             Some(takeover) => Err(Failure::input(format!(
-                "--takeover {}@..: the relay's number must be within 1 to {uavs}",
-                takeover.relay
+                "--takeover {}@{}: the relay's number must be within 1 to {uavs}",
+                takeover.relay,
+                seconds(takeover.from)
             ))),
             None => Ok(()),
         }
@@ -551,7 +561,8 @@ fn takeover(text: &str) -> Result<Takeover, String> {
 /// Reads the start positions of all drones, relay 1 first, from the file of `--start`.
 fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
     let named = |what: String| Failure::input(format!("--start {}: {what}", file.display()));
-    let text = std::fs::read_to_string(file).map_err(|error| named(error.to_string()))?;
+    let text =
+        std::fs::read_to_string(file).map_err(|error| named(format!("cannot be read: {error}")))?;
     let mut starts = vec![None; usize::from(relays)];
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();

@@ -11,7 +11,7 @@ use uav_relay_scenario::scene::Scene;
 use super::data::Data;
 use super::hostile::Hostile;
 use super::web::Web;
-use crate::command::{Failure, file, given_option, number, whole};
+use crate::command::{Failure, file, given_option, number, quantity, whole};
 use crate::simulator::setup::Setup;
 use crate::simulator::true_interference::TrueInterference;
 
@@ -28,23 +28,24 @@ pub struct Options {
     /// Planning method
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     pub method: Method,
-    /// Step of the -step methods, linear SIR, 1e-6 to 1e6; default 0.1
+    /// Step of the target SIR in align-step and stochastic-step, linear, 1e-6 to 1e6; default 0.1
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 1e6))]
     pub epsilon: Option<f64>,
     /// Largest number of rounds of `adjust`, 1 to 65535; default 500
     #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = whole(1_u16, 65_535))]
     pub rounds: Option<u16>,
     /// Largest change of altitude in a round of `adjust`, m, 0 to 1e5; default 10
-    #[arg(long = "explore", value_name = "M", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 1e5).map(narrow))]
+    #[arg(long = "explore", value_name = "M", allow_negative_numbers = true, value_parser = |text: &str| quantity(text, 0.0, 1e5, "m").map(narrow))]
     pub explore_m: Option<f32>,
-    /// Search a grid of columns by rows in `adjust`, 2 to 255 each, instead of from coarse to fine
+    /// Search in `adjust` on a grid of C positions along the line by R altitudes, 2 to 255 each. The default is a search from coarse
+    /// to fine
     #[arg(long, value_name = "CxR", value_parser = grid)]
     pub grid: Option<uav_relay::Local>,
     /// Repeat a stochastic run R times, 1 to 100: fly, measure the true field, and agree again. In the first run the relays assume the
     /// field of Rx at every position
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = whole(1_u8, 100))]
     pub closed_loop: Option<u8>,
-    /// Relative tolerance of the achieved SIR, 1e-6 to 0.1; default 1e-4. Not for the -step methods
+    /// Relative tolerance of the achieved SIR, 1e-6 to 0.1; default 1e-4. Not for the methods align-step and stochastic-step
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = |text: &str| number(text, 1e-6, 0.1))]
     pub tolerance: Option<f64>,
     /// Probability that a frame is lost, 0 to 0.9
@@ -91,18 +92,18 @@ pub struct Options {
 /// Method by which relays agree on their positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Method {
-    /// Algorithm 1 with bracketed targets
+    /// Algorithm 1; the range of possible target SIRs is narrowed down from both sides
     Align,
-    /// Algorithm 1 with the paper's fixed step
+    /// Algorithm 1; the target SIR is lowered in fixed steps, as in the paper
     AlignStep,
     /// Algorithm 1, then Algorithm 2
     Adjust,
-    /// Positions, sides and altitudes together
+    /// Positions along the line, lateral offsets and altitudes together
     #[value(alias = "altitude")]
     Joint,
-    /// Algorithm 4 with bracketed targets
+    /// Algorithm 4 (interference field); targets as with align
     Stochastic,
-    /// Algorithm 4 with the fixed step
+    /// Algorithm 4 (interference field); targets as with align-step
     StochasticStep,
 }
 
@@ -157,7 +158,7 @@ impl Options {
         }
         if self.closed_loop.is_some() && !self.method.is_for_fields() {
             let line = format!(
-                "--closed-loop: has no effect with --method {method}, because relays measure interference only with stochastic and stochastic-step; leave --closed-loop out, or use one of these methods"
+                "--closed-loop: has no effect with --method {method}, because relays measure an interference field only with --method stochastic and stochastic-step; leave --closed-loop out, or use one of these methods"
             );
             return Err(Failure::input(line));
         }
@@ -199,20 +200,20 @@ fn grid(text: &str) -> Result<uav_relay::Local, String> {
 #[command(next_help_heading = "Listening")]
 pub struct Listening {
     /// Hide the interferers from the relays. Each measures the interference at its position once a second, and together they
-    /// estimate an equivalent interferer. The scenario's listening parameters apply, if any
+    /// estimate an equivalent interferer. The table `listen` of the scenario applies, if there is one
     #[arg(long)]
     listen: bool,
     /// Independent samples per measurement, 1 to 1000000; default 1000
     #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = whole(1_u32, 1_000_000))]
     samples: Option<u32>,
-    /// Standard deviation of the shadowing at a position, dB, 0 to 20; default 0
-    #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = |text: &str| number(text, 0.0, 20.0))]
+    /// Standard deviation of the random loss (shadowing) at each position, dB, 0 to 20; default 0
+    #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = |text: &str| quantity(text, 0.0, 20.0, "dB"))]
     shadow: Option<f64>,
     /// Velocity of all interferers, m/s along the line and to its right, each -100 to 100
     #[arg(long, value_name = "VX,VY", allow_hyphen_values = true, value_parser = velocity)]
     move_interferer: Option<[f64; 2]>,
     /// Virtual duration of the measurements, s, 10 to 1e5; default 120
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = |text: &str| number(text, 10.0, 1e5))]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = |text: &str| quantity(text, 10.0, 1e5, "s"))]
     listen_for: Option<f64>,
 }
 
@@ -315,5 +316,6 @@ impl Listening {
 fn velocity(text: &str) -> Result<[f64; 2], String> {
     let form = "must be VX,VY: the speed along the line and to its right, m/s, each -100 to 100";
     let (along, aside) = text.split_once(',').ok_or(form)?;
-    Ok([number(along, -100.0, 100.0)?, number(aside, -100.0, 100.0)?])
+    let speed = |text: &str| quantity(text, -100.0, 100.0, "m/s");
+    Ok([speed(along)?, speed(aside)?])
 }

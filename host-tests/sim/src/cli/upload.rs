@@ -4,9 +4,10 @@ use crate::command::{Failure, number};
 use crate::simulator::setup::UploadSpec;
 use clap::{Args, ValueEnum};
 use uav_relay::flight::axis::Axis;
+use uav_relay::mission::MissionError;
 use uav_relay::{
     Band, Geodetic, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Side,
-    Sites, Upload,
+    Sites, Upload, UploadError,
 };
 use uav_relay_scenario::number::narrow;
 
@@ -15,19 +16,20 @@ use super::time::instant;
 /// Command-line options for missions that a ground station uploads during the run.
 #[derive(Args, Debug)]
 pub struct Uploads {
-    /// Upload the scenario's mission with changed parameters at second S of virtual time. Keys as in a scenario file: x_m, y_m
+    /// Upload the scenario's mission with changed values, at second S of virtual time. Keys as in a scenario file: x_m, y_m
     /// and power_w of the interferer, altitude_m, altitude_min_m, altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m,
-    /// distance_m, tx_w, uav_w, rx_w; reverse and noise_w, 0 to 1; fitted_gap, 0 or 1 to 1000; and tolerance. If the scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and
-    /// those of rx move an end and the distance follows. Repeatable: versions count from 1
+    /// distance_m, tx_w, uav_w, rx_w; reverse and noise_w, 0 to 1; fitted_gap, 0 or 1 to 1000; and tolerance. If the scenario has
+    /// sites, tx_lat_deg, tx_lon_deg and tx_amsl_m move Tx, and rx_lat_deg and so on Rx; the distance follows. Repeatable: the
+    /// first upload is version 1 of the mission
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
-    /// Uploading end of the link; default tx
+    /// End of the chain from which the missions are uploaded; default tx
     #[arg(long, value_name = "END", value_enum)]
     upload_from: Option<End>,
     /// Discard uploads at a reboot: a rebooted relay starts with the scenario's mission
     #[arg(long)]
     no_store: bool,
-    /// End of the link whose ground station requests the relays' reports, for `cargo replay`
+    /// End of the chain whose ground station requests the relays' reports. `cargo replay` shows a --capture only with them
     #[arg(
         long,
         value_name = "END",
@@ -149,7 +151,7 @@ impl Uploads {
             return Err(Failure::input(line));
         }
         if self.no_store && !boots {
-            let line = "--no-store: has no effect, because no relay is switched on again (--boot)";
+            let line = "--no-store: has no effect, because no relay reboots (--boot)";
             return Err(Failure::input(line));
         }
         Ok(())
@@ -186,7 +188,8 @@ impl Uploads {
                 let axis = Axis::between(sites).map_err(|why| refused(&why))?;
                 config.distance_m = narrow(axis.distance_m());
             }
-            let mut upload = Upload::new(base, version, config).map_err(|why| refused(&why))?;
+            let mut upload = Upload::new(base, version, config)
+                .map_err(|why| refused(&in_keys(why, &config)))?;
             if let Some(sites) = moved {
                 upload = upload.with_sites(sites).map_err(|why| refused(&why))?;
             }
@@ -279,6 +282,21 @@ impl Planned {
             tolerance: to(Key::Tolerance, base.tolerance),
             ..*base
         })
+    }
+}
+
+/// Returns the reason why an upload with the parameters `config` is rejected. Parameters have their names in `--upload`.
+fn in_keys(why: UploadError, config: &MissionConfig) -> String {
+    match why {
+        UploadError::Mission(MissionError::Band) => format!(
+            "altitude_min_m {} must be at most, and altitude_max_m {} at least altitude_m {}",
+            config.band.least_m, config.band.most_m, config.common.altitude_m
+        ),
+        UploadError::Mission(MissionError::TooManyForDistance) => format!(
+            "{} relays that stay {} m apart (min_separation_m) do not fit into {} m (distance_m)",
+            config.relays, config.min_separation_m, config.distance_m
+        ),
+        why => why.to_string(),
     }
 }
 

@@ -106,11 +106,11 @@ impl AttackReport {
                 let counted: Vec<String> = one
                     .counted
                     .iter()
-                    .map(|(name, count)| format!("{count} {name}"))
+                    .map(|(name, count)| format!("{count} {}", in_words(name)))
                     .collect();
                 _ = writeln!(
                     text,
-                    "attack on a chain {tags} signed frames: {} {kind} frames, {} accepted; counted as {}",
+                    "attack on a chain {tags} signed frames: {} {kind} frames, {} accepted; the relays counted {}",
                     one.sent,
                     one.taken,
                     counted.join(", ")
@@ -135,7 +135,7 @@ impl AttackReport {
         if self.formed != self.formed_without {
             _ = writeln!(
                 text,
-                "views (agreements on the chain's members): {}, without the attack {}",
+                "agreements on the chain's members: {} with the attack, {} without it",
                 self.formed, self.formed_without
             );
         }
@@ -161,6 +161,17 @@ fn formed(outcome: &Outcome) -> u64 {
         })
         .collect();
     views.len() as u64
+}
+
+/// Returns the name of a counter as it reads after a number of frames.
+fn in_words(counter: &str) -> &str {
+    match counter {
+        "overheard" => "between other relays",
+        "crc" => "with a wrong CRC",
+        "mission" => "of another mission",
+        "view" => "of another view",
+        other => other,
+    }
 }
 
 fn attack_counts(outcome: &Outcome, kind: AttackKind) -> AttackCountsReport {

@@ -278,8 +278,11 @@ impl ChainReport {
         if let Some(back) = self.back {
             _ = writeln!(
                 text,
-                "way back: worst hop SIR {:.6} ({:.3} dB); required: {:?} times the SIR toward Rx (link.reverse); worst direction: {}",
-                back.worst_back, back.worst_back_db, back.reverse, back.worst_direction
+                "way back: worst hop SIR {:.6} ({:.3} dB); required: {:?} times the SIR toward Rx (link.reverse); limiting direction: {}",
+                back.worst_back,
+                back.worst_back_db,
+                back.reverse,
+                hops::direction_words(back.worst_direction)
             );
         }
         text += &self.flown_text();
@@ -312,24 +315,30 @@ impl ChainReport {
                 self.rounds.len() - 1
             );
         }
-        _ = writeln!(
-            text,
-            "cost: {} sweeps along the chain, {} messages, {} bytes, {:.3} s of virtual time",
-            self.sweeps, self.messages, self.bytes, self.virtual_s
-        );
-        let faults = self.faults;
-        if faults.lost + faults.corrupted + faults.duplicated + faults.reordered + faults.rejected
-            > 0
-        {
+        // A run that could not be started has no cost.
+        if self.sweeps > 0 || self.messages > 0 {
             _ = writeln!(
                 text,
-                "injected faults: frames {} lost, {} corrupted, {} duplicated, {} reordered; {} frames rejected (seed {})",
-                faults.lost,
-                faults.corrupted,
-                faults.duplicated,
-                faults.reordered,
-                faults.rejected,
-                self.seed
+                "cost: {} along the chain, {} messages, {} bytes, {:.3} s of virtual time",
+                timeline::sweeps_text(self.sweeps),
+                self.messages,
+                self.bytes,
+                self.virtual_s
+            );
+        }
+        let faults = self.faults;
+        if faults.lost + faults.corrupted + faults.duplicated + faults.reordered > 0 {
+            _ = writeln!(
+                text,
+                "injected faults: {} frames lost, {} corrupted, {} duplicated, {} reordered (seed {})",
+                faults.lost, faults.corrupted, faults.duplicated, faults.reordered, self.seed
+            );
+        }
+        if faults.rejected > 0 {
+            _ = writeln!(
+                text,
+                "frames that relays rejected, for example as outdated or damaged: {}",
+                faults.rejected
             );
         }
         if let Some(listened) = &self.listened {
@@ -480,14 +489,14 @@ fn ended(method: &str, outcome: &Outcome) -> Option<String> {
         ),
         Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
         Ending::Broken => {
-            let silent: Vec<String> = (1..)
+            let silent: Vec<u16> = (1..)
                 .zip(&outcome.relays)
-                .filter(|(_, relay): &(u16, _)| relay.killed.is_some())
-                .map(|(index, _)| index.to_string())
+                .filter(|(_, relay)| relay.killed.is_some())
+                .map(|(index, _)| index)
                 .collect();
             Some(format!(
-                "the chain is broken: relay {} went silent",
-                silent.join(", ")
+                "the chain is broken: {} went silent",
+                uav_relay_screen::named(&silent)
             ))
         }
         Ending::NoQuorum => Some("no quorum: too few relays receive each other".to_owned()),
@@ -533,7 +542,7 @@ impl AirReport {
         let mut text = String::new();
         _ = writeln!(
             text,
-            "radio channel ({}, {} bit/s): load {load:.3}, {} frames sent, {} dropped by full queues; receptions lost: {} to collisions, {} to own transmissions",
+            "radio channel ({}, {} bit/s): load {load:.3} (air time of all frames / duration of the run), {} frames sent, {} dropped by full queues; receptions lost: {} in collisions, {} while the receiver was sending",
             self.access, self.baud, counts.sent, counts.dropped, counts.collided, counts.unheard
         );
         text
@@ -584,7 +593,7 @@ impl AvailabilityReport {
             _ = match self.first_agreement_s {
                 Some(first) => writeln!(
                     text,
-                    "availability: {availability:.6} (share of time with a complete chain at its optimum) since the first agreement at {first:.3} s; longest outage {outage:.3} s"
+                    "availability: {availability:.6} (share of the time since the first agreement, at {first:.3} s, in which the longest possible chain is at its best positions); longest outage {outage:.3} s"
                 ),
                 None => writeln!(
                     text,
@@ -595,11 +604,11 @@ impl AvailabilityReport {
         if let Some(most) = self.most_flying {
             _ = writeln!(
                 text,
-                "largest number of parts of the chain with separate agreements at the same time: {most}"
+                "largest number of separate chains at the same time: {most} (above 1, the chain was split)"
             );
         }
         if let Some(least) = self.least_separation_m {
-            _ = writeln!(text, "smallest distance of two relays: {least:.3} m");
+            _ = writeln!(text, "smallest distance between two relays: {least:.3} m");
         }
         text
     }

@@ -118,6 +118,7 @@ impl HopSlots {
         {
             if *hop == 1 {
                 let back = slot_back.map_or("", |_| "    back from         to");
+                text += "time slots, as shares of the period of all slots:\n";
                 _ = writeln!(text, "{:>6} {:>12} {:>10}{back}", "hop", "slot from", "to");
             }
             let back = slot_back.map(|[begin, end]| format!(" {begin:>12.6} {end:>10.6}"));
@@ -223,6 +224,15 @@ pub const fn direction(there: f64, back: f64) -> &'static str {
     }
 }
 
+/// Returns a result of [`direction`] in words, for text after `limiting direction`.
+pub fn direction_words(direction: &str) -> &'static str {
+    match direction {
+        "forward" => "toward Rx",
+        "backward" => "toward Tx",
+        _ => "both equally",
+    }
+}
+
 /// Creates a report of each relay, numbered from 1, with its position and received SIR. `sirs` has the linear SIR at
 /// which each relay receives the previous node.
 pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
@@ -271,11 +281,11 @@ pub fn hops_table(
             "x [m]",
             aside(&|| "y [m]".to_owned()),
             "h [m]",
-            "SIR",
+            "SIR received",
             "SIR [dB]",
             rx_sir_back.map_or_else(String::new, |_| format!(
                 " {:>12} {:>9}",
-                "SIR back", "back [dB]"
+                "SIR way back", "back [dB]"
             ))
         );
         let kept = relays.iter().map(|relay| {
@@ -326,5 +336,10 @@ fn lost_line(relay: &LostReport, aside: &str) -> String {
         || format!("{:>12}{aside} {:>10}", "-", "-"),
         |(x_m, h_m)| format!("{x_m:>12.3}{aside} {h_m:>10.2}"),
     );
-    format!("{:>6} {place} {:>12}", relay.index, relay.why)
+    let why = if relay.why == "apart" {
+        "not in chain"
+    } else {
+        relay.why
+    };
+    format!("{:>6} {place} {why:>12}", relay.index)
 }

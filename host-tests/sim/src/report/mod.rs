@@ -11,8 +11,8 @@ pub mod traffic;
 pub use attack::AttackReport;
 pub use chain::{AirReport, AllInterferersReport, ChainReport, flown};
 pub use hops::{
-    HopSlots, RelayReport, WorstBack, db, direction, hop_sirs, hop_sirs_back, hops_table, place,
-    relays,
+    HopSlots, RelayReport, WorstBack, db, direction, direction_words, hop_sirs, hop_sirs_back,
+    hops_table, place, relays,
 };
 pub use sensing::SensingReport;
 pub use timeline::{counted, seconds};

@@ -138,10 +138,11 @@ impl RotationReport {
 
     /// Formats the figures as a table with two columns: announced and unannounced departures.
     pub fn table(&self) -> String {
-        let mut text = format!(
-            "\nreplacement of tired drones, {} of the fleet flying{:>17}{:>14}\n",
-            self.flying, "announced", "unannounced"
+        let title = format!(
+            "replacement of drones with low batteries, {} fly",
+            self.flying
         );
+        let mut text = format!("\n{title:<52}{:>14}{:>14}\n", "announced", "unannounced");
         let mut row = |name: &str, of: &dyn Fn(&RotationFigures) -> String| {
             let plain = self.unannounced.as_ref().map_or(String::new(), of);
             _ = writeln!(text, "{name:<52}{:>14}{plain:>14}", of(&self.announced));
@@ -171,37 +172,39 @@ impl RotationReport {
             it.forced.to_string()
         });
         row("replacements per hour", &|it| format!("{:.2}", it.per_hour));
-        row("replacements per hour, computed from batteries", &|it| {
+        row("replacements per hour that the batteries require", &|it| {
             format!("{:.2}", it.arithmetic_per_hour)
         });
-        row("from request to leave to permission, mean, s", &|it| {
+        row("time from request to permission to leave, mean, s", &|it| {
             format!("{:.1}", it.mean_wait_s)
         });
-        row("from request to leave to permission, longest, s", &|it| {
-            format!("{:.1}", it.longest_wait_s)
-        });
         row(
-            &format!("least endurance left at home (required: {RESERVE_S}), s"),
+            "time from request to permission to leave, longest, s",
+            &|it| format!("{:.1}", it.longest_wait_s),
+        );
+        row(
+            &format!("least flight time left at home (required: {RESERVE_S}), s"),
             &|it| some(it.least_left_s, 1),
         );
-        row("smallest distance of two drones, m", &|it| {
+        row("smallest distance between two drones, m", &|it| {
             some(it.nearest_m, 2)
         });
         row("time of the smallest distance, s", &|it| {
             some(it.nearest_at_s, 1)
         });
-        row("largest number of parts with separate agreements", &|it| {
-            it.chains.to_string()
-        });
+        row(
+            "largest number of separate chains at the same time",
+            &|it| it.chains.to_string(),
+        );
         if self.unannounced.is_some() {
-            text += "unannounced: a tired drone flies home with its relay off, and a spare in the air is switched on at that moment\n";
+            text += "unannounced: a drone with a low battery flies home with its relay off, and a spare in the air is switched on at that moment\n";
         }
         for figures in self.figures() {
             for drone in figures.nearest.iter().flatten() {
                 let [[x, y, h], [to_x, to_y, to_h]] = [drone.at_m, drone.goal_m];
                 _ = writeln!(
                     text,
-                    "smallest distance: relay {} at ({x:.1}, {y:.1}, {h:.1}) m, on its way to ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
+                    "smallest distance: relay {} at x, y, altitude ({x:.1}, {y:.1}, {h:.1}) m, on its way to ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
                     drone.relay, drone.state
                 );
             }
@@ -255,6 +258,9 @@ impl RotationRuns {
         }
         let all = self.total();
         line("all", &all);
+        text += "hours: time after the chain was complete; below: share of it with an SIR below 0.99 of the optimum; lowest: smallest share of the optimum\n\
+                 left: drones replaced; forced: those that left without permission; computed: replacements per hour that the batteries require\n\
+                 least: smallest flight time left at home; near: smallest distance between two drones; chains: most separate chains at the same time\n";
         for (cause, span_s) in &all.below_s {
             _ = writeln!(
                 text,

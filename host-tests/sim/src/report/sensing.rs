@@ -115,7 +115,7 @@ impl SensingReport {
             ) {
                 _ = write!(
                     text,
-                    ", {share:.4} of the optimum {optimum:.6}; {mean:.4} of it on average since the first agreement"
+                    ", {share:.4} of the optimum {optimum:.6}; on average {mean:.4} of the optimum since the first agreement"
                 );
             }
             text.push('\n');

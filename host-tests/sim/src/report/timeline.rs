@@ -150,8 +150,7 @@ pub fn line(moment: &Moment) -> String {
     match moment.what {
         TimelineEvent::ViewAccepted { .. }
         | TimelineEvent::Converged
-        | TimelineEvent::Infeasible
-        | TimelineEvent::Adopted(_) => format!("relay {relay}: {line}"),
+        | TimelineEvent::Infeasible => format!("relay {relay}: {line}"),
         _ => line,
     }
 }
@@ -233,7 +232,7 @@ impl Group {
         let (relay, other) = (one.relay, one.other.unwrap_or_default());
         match one.what {
             "silent" => format!("{who} silent"),
-            "switched on" => format!("{who} switched on"),
+            "switched on" => format!("{who} rebooted"),
             "lost" => format!("relay {other} lost"),
             "found" => format!("relays {relay} and {other} linked"),
             "view accepted" => format!(
@@ -258,7 +257,8 @@ impl Group {
             "engaged" | "released" if self.relays.len() > 1 => {
                 format!("{} {}", counted(self.relays.len()), one.what)
             }
-            "engaged" | "released" | "blind" => format!("{who} {}", one.what),
+            "engaged" | "released" => format!("{who} {}", one.what),
+            "blind" => format!("{who}: no position"),
             "restarted" => format!("{who}: autopilot restarted"),
             "offered" | "stored" | "adopted" => {
                 format!("mission {} {}", one.version.unwrap_or_default(), one.what)
@@ -277,7 +277,7 @@ impl Group {
         let version = one.version.unwrap_or_default();
         match one.what {
             "silent" => format!("{who} went silent"),
-            "switched on" => format!("{who} switched on again"),
+            "switched on" => format!("{who} rebooted"),
             "lost" => format!("{who}: relay {other} lost (no reply)"),
             "found" if many => format!("{who} became neighbours"),
             "found" => format!("{who} became a neighbour of relay {other}"),
@@ -305,7 +305,12 @@ impl Group {
                     "{who}: the chain works without this relay now, its drone has permission to leave"
                 )
             }
-            "told to leave" => format!("{who}: relay {other} has permission to leave"),
+            "told to leave" => {
+                format!("{who}: relay {other} is outside of the chain, and has permission to leave")
+            }
+            "has to leave" => {
+                format!("{who}: the battery lasts only for the way home, and the drone must leave")
+            }
             "no quorum" => {
                 format!("{who}: too few relays receive each other (no quorum), position held")
             }
@@ -342,10 +347,7 @@ impl Group {
             }
             "offered" => format!("the ground station at Rx uploads mission version {version}"),
             "stored" => format!("{who} stored mission version {version}"),
-            "adopted" => format!(
-                "mission version {version} adopted: {}",
-                counted(self.relays.len())
-            ),
+            "adopted" => format!("mission version {version} adopted by {who}"),
             _ => "no positions meet any target SIR, so the relays keep their positions".to_owned(),
         }
     }
@@ -354,6 +356,11 @@ impl Group {
 /// Formats a count: "1 relay", "8 relays".
 pub fn counted(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
+}
+
+/// Formats a number of sweeps: "1 sweep", "3 sweeps".
+pub(super) fn sweeps_text(sweeps: u32) -> String {
+    format!("{sweeps} {}", if sweeps == 1 { "sweep" } else { "sweeps" })
 }
 
 /// Number of lines at the start, and also at the end, that a shortened log keeps.
@@ -611,16 +618,16 @@ pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
         }
         _ = writeln!(
             text,
-            "view {}, {}: {}",
-            one.view,
+            "{} (view {}): {}",
             what.join(", "),
+            one.view,
             one.times()
         );
     }
     if same > 0 {
         _ = writeln!(
             text,
-            "views agreed without a change of the chain's members: {same}"
+            "memberships agreed again with the same members: {same}"
         );
     }
     text
@@ -633,11 +640,12 @@ impl RecoveryReport {
             _ = write!(text, "noticed after {:.3} s, ", detected - happened);
         }
         if let Some(detected) = self.detected_s {
-            _ = write!(
-                text,
-                "membership agreed {:.3} s after the detection, ",
-                self.formed_s - detected
-            );
+            let since = match self.happened_s {
+                Some(_) => "later",
+                None => "after a relay noticed",
+            };
+            let after = self.formed_s - detected;
+            _ = write!(text, "membership agreed {after:.3} s {since}, ");
         }
         if let Some(offered) = self.offered_s {
             let after = self.formed_s - offered;
@@ -648,11 +656,11 @@ impl RecoveryReport {
         };
         _ = write!(
             text,
-            "positions agreed {:.3} s after the membership",
+            "positions agreed {:.3} s later",
             converged - self.formed_s
         );
         if let Some(sweeps) = self.sweeps {
-            _ = write!(text, "; {sweeps} sweeps");
+            _ = write!(text, "; {}", sweeps_text(sweeps));
         }
         text
     }
@@ -682,7 +690,11 @@ mod tests {
         );
         assert_eq!(
             of(4, TimelineEvent::MayLeaveTold, Some(3)),
-            "relay 4: relay 3 has permission to leave"
+            "relay 4: relay 3 is outside of the chain, and has permission to leave"
+        );
+        assert_eq!(
+            of(3, TimelineEvent::MustLeave, None),
+            "relay 3: the battery lasts only for the way home, and the drone must leave"
         );
     }
 }

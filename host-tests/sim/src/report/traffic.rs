@@ -276,8 +276,13 @@ impl FlowReport {
             );
         }
         let queue = |queue: &QueueReport| {
+            let relay = if matches!(queue.node.as_str(), "Tx" | "Rx") {
+                ""
+            } else {
+                "relay "
+            };
             format!(
-                "{} {:.2} ({})",
+                "{relay}{}: {:.2} ({})",
                 queue.node, queue.mean_packets, queue.most_packets
             )
         };
@@ -291,7 +296,7 @@ impl FlowReport {
         let queues: Vec<String> = queues.into_iter().take(shown).map(queue).collect();
         _ = writeln!(
             text,
-            "    {which}, mean length (largest length) in packets: {}",
+            "    {which}, mean length (largest length), packets: {}",
             queues.join(", ")
         );
         text
@@ -347,11 +352,11 @@ impl PeriodReport {
         let of = if relays == 1 { "relay" } else { "relays" };
         let state = match (self.state, self.promised_bps.as_slice()) {
             ("agreed", promised) => format!("{} Mbit/s predicted", list(promised)),
-            ("pending", _) => "no agreement yet, or drones on their way".to_owned(),
-            _ => "broken".to_owned(),
+            ("pending", _) => "positions not agreed, or not reached yet".to_owned(),
+            _ => "chain broken".to_owned(),
         };
         let mut text = format!(
-            "{:>10.3} to {:.3} s: {relays} {of}, {state}, {} delivered",
+            "{:>10.3} to {:.3} s: {relays} {of}, {state}, {} Mbit/s delivered",
             self.from_s,
             self.until_s,
             list(&self.delivered_bps)

@@ -176,10 +176,10 @@ impl DipCause {
         match self {
             Self::NoSpare => "too few relays, no spare",
             Self::SpareWaits => "too few relays, a spare waits",
-            Self::Agreement => "view, lease or positions not agreed",
+            Self::Agreement => "relays have not agreed",
             Self::Guard => "collision avoidance holds a drone back",
             Self::Motion => "drones fly to their positions",
-            Self::Positions => "agreed positions",
+            Self::Positions => "all drones at their agreed positions",
         }
     }
 }

@@ -72,7 +72,8 @@ fn the_timeline_of_a_loss_has_a_line_per_event() {
         " s  membership agreed: 7 relays (view ",
         " s  positions agreed: 7 relays, SIR 2.312",
         // The last frame of relay 4, a lease renewal, is up to 5 s old; the first probe after 15 s detects the loss.
-        ", relay 4 lost: noticed after 1",
+        "relay 4 lost (view ",
+        "): noticed after 1",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }
@@ -264,8 +265,8 @@ fn a_soak_runs_to_its_end_and_reports_the_availability() {
     for line in [
         "radio channel (csma, 115200 bit/s): load 0.",
         "availability: 0.",
-        "at the same time: 1",
-        "smallest distance of two relays: ",
+        "separate chains at the same time: 1 ",
+        "smallest distance between two relays: ",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }

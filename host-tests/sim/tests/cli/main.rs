@@ -107,7 +107,7 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
         "{table}"
     );
     assert!(
-        table.contains("cost: 1 sweeps along the chain, 14 messages"),
+        table.contains("cost: 1 sweep along the chain, 14 messages"),
         "{table}"
     );
     assert_eq!(table.lines().count(), 1 + 8 + 1 + 2, "{table}");

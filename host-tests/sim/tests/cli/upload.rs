@@ -102,9 +102,9 @@ fn an_upload_is_in_the_timeline_and_the_picture() {
         "positions agreed: 8 relays, SIR 2.466",
         "20.000 s  the ground station at Tx uploads mission version 1",
         " s  relays 1 to 8 stored mission version 1",
-        " s  mission version 1 adopted: 8 relays",
+        " s  mission version 1 adopted by relays 1 to 8",
         "positions agreed: 8 relays, SIR 1.582",
-        "view 1, mission version 1 uploaded: adopted 0.",
+        "mission version 1 uploaded (view 1): adopted 0.",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }

@@ -29,7 +29,7 @@ struct Options {
 fn board(name: &str) -> Result<Board, String> {
     Board::named(name).ok_or_else(|| {
         let names = BOARDS.map(|board| board.name);
-        format!("one of {}", names.join(", "))
+        format!("must be one of {}", names.join(", "))
     })
 }
 
@@ -92,7 +92,7 @@ fn of_image(board: &Board, radio: bool) -> Result<(String, Vec<Piece>), String> 
 
 fn of_block(board: &Board, block: &Path) -> Result<(String, Vec<Piece>), Failure> {
     let named = |what: String| Failure::input(format!("--block {}: {what}", block.display()));
-    let bytes = std::fs::read(block).map_err(|error| named(error.to_string()))?;
+    let bytes = std::fs::read(block).map_err(|error| named(format!("cannot be read: {error}")))?;
     if bytes.len() != LEN {
         return Err(named(format!(
             "has {} bytes, but a block has {LEN} bytes",

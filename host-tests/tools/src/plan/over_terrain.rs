@@ -70,14 +70,18 @@ pub struct OverTerrain {
 impl fmt::Display for OverTerrain {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.blind_sir_db, self.terrain_gain_db) {
-            (Some(sir_db), Some(gain_db)) => write!(
-                f,
-                "positions that ignore the terrain: worst hop {sir_db:.3} dB with terrain; this plan gains {gain_db:.3} dB"
-            )?,
+            (Some(sir_db), Some(gain_db)) => {
+                let side = if gain_db < 0.0 { "below" } else { "above" };
+                let apart_db = gain_db.abs();
+                write!(
+                    f,
+                    "positions that ignore the terrain: worst hop {sir_db:.3} dB with terrain; this plan is {apart_db:.3} dB {side} that"
+                )?;
+            }
             _ => f.write_str("positions that ignore the terrain: none")?,
         }
         match &self.blind_problem {
-            Some(problem) => write!(f, "; they cannot be flown: {problem}"),
+            Some(problem) => write!(f, "; those positions cannot be flown: {problem}"),
             None => Ok(()),
         }
     }

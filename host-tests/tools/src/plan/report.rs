@@ -7,7 +7,9 @@ use serde::Serialize;
 use uav_relay_scenario::fleet::FleetSize;
 use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::{Noise, Scenario};
-use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, counted, db, hops_table, relays};
+use uav_relay_sim::report::{
+    HopSlots, RelayReport, WorstBack, counted, db, direction_words, hops_table, relays,
+};
 use uav_relay_terrain::report::TerrainReport;
 
 use super::area::AreaReport;
@@ -151,7 +153,7 @@ impl RateReport {
         }
         if let Some(target_bps) = self.target_rate_bps {
             let back = if self.reverse > 0.0 {
-                format!(" to Rx and {:.6e} back", self.reverse * target_bps)
+                format!(" to Rx and {:.6e} bit/s back", self.reverse * target_bps)
             } else {
                 String::new()
             };
@@ -222,7 +224,7 @@ fn bps(rate: Rate) -> String {
     match rate {
         Rate::There(rate_bps) => format!("{rate_bps:.6e} bit/s"),
         Rate::Both([there_bps, back_bps]) => {
-            format!("{there_bps:.6e} bit/s to Rx and {back_bps:.6e} back")
+            format!("{there_bps:.6e} bit/s to Rx and {back_bps:.6e} bit/s back")
         }
     }
 }
@@ -279,8 +281,8 @@ impl WayBack {
         };
         let needed = self.reverse.map_or_else(String::new, |reverse| {
             format!(
-                "; required: {reverse:?} times the SIR toward Rx (link.reverse); worst direction: {}",
-                self.worst_direction.unwrap_or("unknown")
+                "; required: {reverse:?} times the SIR toward Rx (link.reverse); limiting direction: {}",
+                self.worst_direction.map_or("unknown", direction_words)
             )
         });
         format!(

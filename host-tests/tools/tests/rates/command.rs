@@ -92,8 +92,8 @@ fn both_directions_are_in_the_table_and_in_the_picture() {
     let table = text(&file, &options);
     let report = json(&file, "--uavs 3");
     for part in [
-        "SIR [dB]     SIR back back [dB]\n",
-        "required: 0.5 times the SIR toward Rx (link.reverse); worst direction: both\n",
+        "SIR received  SIR [dB] SIR way back back [dB]\n",
+        "required: 0.5 times the SIR toward Rx (link.reverse); limiting direction: both equally\n",
         "proven for this model: no positions are better; not modelled: terrain and obstacles\n",
     ] {
         assert!(table.contains(part), "{part}: {table}");

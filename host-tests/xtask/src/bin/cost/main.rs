@@ -14,7 +14,7 @@ use std::process::{Command, ExitCode};
 
 use uav_relay_xtask::toolchain::spaced;
 
-const USAGE: &str = "cargo cost [--write]: what the firmware costs\n\n  --write  write the measured figures into README.md and examples/RESULTS.md";
+const USAGE: &str = "Measures flash, RAM, stack and instructions of the firmware, and compares them with their budgets\n\nUsage: cargo cost [--write]\n\n  --write  write the measured figures into README.md and examples/RESULTS.md";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
