@@ -30,9 +30,9 @@ fn a_fleet_of_twelve_replaces_its_tired_drones() {
     }
 }
 
-/// Simulates the share `part` of `HOURS` (100) virtual hours with a fleet, one third on a channel that loses no frame, one
-/// third with 30 % and one with half of the frames lost. Prints a line of a table for each.
+/// Simulates the share `part` of `HOURS` (100) virtual hours with a fleet, and prints a table.
 ///
+/// One third of the time the channel loses no frame, one third 30 %, and one third half of the frames.
 /// `most_below` has the largest share of the time with a low SIR, for each loss. The seeds are fixed, so that the test
 /// cannot fail by chance. A run changes with each frame, so the limits are about twice the present figures.
 fn soak(fleet: u16, flying: u16, part: f64, most_below: [f64; 3]) {

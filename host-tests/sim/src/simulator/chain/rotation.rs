@@ -30,14 +30,15 @@ const TAKE_OFFS: Duration = Duration::from_millis(8_000);
 /// Distance of a drone from a point of its path, m, below which the drone has reached this point.
 const ARRIVED_M: f64 = 0.5;
 
-/// Time, s, for which a spare should already wait beside the line at the latest time for a request to leave.
+/// Time, s, from a spare's arrival beside the line to the latest time for a request to leave.
 const EARLY_S: f64 = 40.0;
 
-/// Time, s, before the latest time for a request at which a relay requests to leave, if a spare is ready.
+/// Time, s, from a request to leave, made while a spare is ready, to the latest time for it.
 const MARGIN_S: f64 = 30.0;
 
-/// Time left to a drone at which its relay requests to leave even if no spare waits, as a part of the longest recent
-/// time from a request to the permission. A departure without a spare takes less time.
+/// Time left to a drone at which its relay requests to leave even if no spare waits.
+///
+/// It is a part of the longest recent time from a request to the permission. A departure without a spare takes less time.
 const DEADLINE: f64 = 0.5;
 
 /// Time for which a drone must hover beside the line before it counts as a spare that is ready to join. A relay
