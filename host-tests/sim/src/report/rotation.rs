@@ -50,7 +50,8 @@ pub struct RotationFigures {
     pub per_hour: f64,
     /// Number of relays per hour that would leave if each stayed as long as its battery allows.
     ///
-    /// A relay may stay until its battery has just enough for the way home and the reserve.
+    /// A relay may stay until its battery has just enough for the way home and the reserve. Its time together with the
+    /// spare that joins before a departure is subtracted.
     pub arithmetic_per_hour: f64,
     /// Mean time from a relay's request to leave until it left, s.
     pub mean_wait_s: f64,
@@ -83,8 +84,10 @@ impl RotationFigures {
     pub fn new(spec: &RotationSpec, rotated: &Rotated, chains: usize) -> Self {
         let hours = rotated.watched_s / 3_600.0;
         let left = f64::from(rotated.replaced).max(1.0);
-        // The drones' own times in the chain are known: no relay may stay longer than its battery allows.
-        let served_s = rotated.possible_s / left;
+        // The drones' own times in the chain are known: no relay may stay longer than its battery allows. A spare joins
+        // before the relay leaves, so for some time both are in the chain.
+        let both_s = (rotated.served_s - f64::from(spec.flying) * rotated.watched_s) / left;
+        let alone_s = rotated.possible_s / left - both_s.max(0.0);
         Self {
             complete_at_s: rotated.complete_at.map(seconds),
             watched_s: rotated.watched_s,
@@ -94,7 +97,7 @@ impl RotationFigures {
             replaced: rotated.replaced,
             forced: rotated.forced,
             per_hour: f64::from(rotated.replaced) / hours.max(1e-9),
-            arithmetic_per_hour: f64::from(spec.flying) * 3_600.0 / served_s.max(1.0),
+            arithmetic_per_hour: f64::from(spec.flying) * 3_600.0 / alone_s.max(1.0),
             mean_wait_s: rotated.waits_s / left,
             longest_wait_s: rotated.longest_wait_s,
             least_left_s: rotated.least_left_s,

@@ -113,6 +113,8 @@ pub struct Rotated {
     ///
     /// A relay can stay until its battery holds only the reserve and the energy for the way home.
     pub possible_s: f64,
+    /// Time of all relays in the chain since `complete_at`, s: of two relays for each second, two seconds.
+    pub served_s: f64,
     /// Longest time from a relay's request to leave until it left, s.
     pub longest_wait_s: f64,
     /// Sum of the times from each relay's request to leave until it left, s.

@@ -30,12 +30,16 @@ const TAKE_OFFS: Duration = Duration::from_millis(8_000);
 /// Distance of a drone from a point of its path, m, below which the drone has reached this point.
 const ARRIVED_M: f64 = 0.5;
 
-/// Time, s, for which a spare should already wait beside the line when a drone has to leave.
+/// Time, s, from a spare's arrival beside the line to the latest time for a request to leave.
 const EARLY_S: f64 = 40.0;
 
-/// Time left to a drone, s, at which its relay requests to leave even if no spare waits. After this time the drone has
-/// to fly home.
-const DEADLINE_S: f64 = 40.0;
+/// Time, s, from a request to leave, made while a spare is ready, to the latest time for it.
+const MARGIN_S: f64 = 30.0;
+
+/// Time left to a drone at which its relay requests to leave even if no spare waits.
+///
+/// It is a part of the longest recent time from a request to the permission. A departure without a spare takes less time.
+const DEADLINE: f64 = 0.5;
 
 /// Time for which a drone must hover beside the line before it counts as a spare that is ready to join. A relay
 /// requests to leave early only if such a spare is ready.
@@ -344,6 +348,10 @@ impl Chain {
         }
         let dip = (share < GOOD).then(|| self.dip(rotation, flight, hop));
         rotation.count(now, span, share, dip);
+        if rotation.record.complete_at.is_some() {
+            let serving = rotation.drones.iter().filter(|it| it.duty == Duty::Serving);
+            rotation.record.served_s += serving.count() as f64 * seconds(span);
+        }
         let air = rotation.drones.iter().zip(&flight.drones).enumerate();
         let air: Vec<(usize, Point)> = air
             .filter(|(_, (battery, _))| !matches!(battery.duty, Duty::Ground(_)))
@@ -599,16 +607,27 @@ impl Chain {
             }
         }
         tired.sort_by(|one, other| one.1.total_cmp(&other.1));
-        // One departure at a time: the latest start of each.
-        // A spare comes back after its way home, its time on the ground and its way out.
+        // Latest time of each request. Departures follow each other, and with n spares the n-th next departure needs the
+        // drone that this departure frees: after its way home, its time on the ground and its way out.
         let all = usize::from(self.setup.mission.relays());
-        let spares = all.saturating_sub(usize::from(rotation.spec.flying)).max(1) as f64;
-        let turn_s = (rotation.spec.ground_s + 200.0) / spares;
-        let mut latest = f64::INFINITY;
+        let spares = all.saturating_sub(usize::from(rotation.spec.flying)).max(1);
+        let distance_m = f64::from(self.setup.mission.config().distance_m);
+        let altitude_m = f64::from(self.setup.mission.config().common.altitude_m);
+        let far_out = rotation.way_out(distance_m, altitude_m, 0);
+        let flight_s = 2.0 * Rotation::time_s([-20.0, 0.0, 0.0], &far_out);
+        let cycle_s = rotation.slot_s + rotation.spec.ground_s + flight_s;
         let mut starts: Vec<(usize, f64, f64)> = Vec::new();
         for (index, left_s) in tired.iter().rev() {
-            latest = left_s.min(latest) - rotation.slot_s.max(turn_s);
-            starts.push((*index, latest, *left_s));
+            let after_s = |count: usize| {
+                let later = starts
+                    .len()
+                    .checked_sub(count)
+                    .and_then(|at| starts.get(at));
+                later.map_or(f64::INFINITY, |(_, start_s, _)| *start_s)
+            };
+            let latest_s = left_s.min(after_s(1)) - rotation.slot_s;
+            let latest_s = latest_s.min(after_s(spares) - cycle_s);
+            starts.push((*index, latest_s, *left_s));
         }
         starts.reverse();
         let serving = starts.len();
@@ -639,7 +658,8 @@ impl Chain {
                 continue;
             }
             requests += usize::from(drone.requested.is_some());
-            let is_due = left_s <= DEADLINE_S || start_s <= EARLY_S && spares > requests;
+            let is_due =
+                left_s <= rotation.slot_s * DEADLINE || start_s <= MARGIN_S && spares > requests;
             let is_due = is_due && at < 2 && rotation.record.complete_at.is_some();
             if drone.requested.is_none() && is_due {
                 drone.requested = Some(now);
