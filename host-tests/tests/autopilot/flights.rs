@@ -1,5 +1,6 @@
 //! Random flights with failsafes, restarts, delays and pilots: no drone is engaged without its pilot.
 
+use host_tests::make;
 use std::collections::VecDeque;
 
 use chacha20::ChaCha8Rng;
@@ -361,10 +362,12 @@ impl Flight {
     }
 
     fn setpoint(&mut self) {
-        let place = |rng: &mut ChaCha8Rng| Placement {
-            x_m: rng.random_range(200.0..400.0),
-            y_m: rng.random_range(-20.0..20.0),
-            altitude_m: rng.random_range(20.0..40.0),
+        let place = |rng: &mut ChaCha8Rng| {
+            make::placement(
+                rng.random_range(200.0..400.0),
+                rng.random_range(-20.0..20.0),
+                rng.random_range(20.0..40.0),
+            )
         };
         self.setpoint = self.rng.random_bool(0.8).then(|| place(&mut self.rng));
     }

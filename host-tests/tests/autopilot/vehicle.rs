@@ -13,6 +13,7 @@ use uav_relay::flight::mavlink::frame;
 use uav_relay::{Geodetic, Instant, Placement, Sites};
 
 use crate::signed::Key;
+use host_tests::make;
 
 pub(crate) const SYSTEM: u8 = 7;
 
@@ -74,11 +75,7 @@ impl Target {
     }
 
     pub(crate) fn place(&self) -> Placement {
-        let point = Geodetic {
-            lat_e7: self.lat_e7,
-            lon_e7: self.lon_e7,
-            amsl_mm: (self.alt_m * 1e3) as i32,
-        };
+        let point = make::geodetic(self.lat_e7, self.lon_e7, (self.alt_m * 1e3) as i32);
         axis().place(point).unwrap()
     }
 }

@@ -25,6 +25,7 @@ use uav_relay_sim::simulator::drones::Point;
 use crate::drone::{instant, length, node, way};
 use crate::medium::{Faults, Medium};
 use crate::world::beside;
+use host_tests::make;
 
 const STEP_S: f64 = 0.1;
 const SPEED: f64 = 5.0;
@@ -61,11 +62,7 @@ impl Line {
 }
 
 fn placement([x, y, h]: Point) -> Placement {
-    Placement {
-        x_m: x as f32,
-        y_m: y as f32,
-        altitude_m: h as f32,
-    }
+    make::placement(x as f32, y as f32, h as f32)
 }
 
 fn point(place: Placement) -> Point {

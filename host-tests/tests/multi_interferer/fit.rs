@@ -1,5 +1,6 @@
 //! Hypothetical interferer in known cases: published values, one source, sources at one position.
 
+use host_tests::make;
 use std::time::Instant;
 
 use chacha20::ChaCha8Rng;
@@ -185,11 +186,7 @@ fn extreme_scenes_have_a_finite_fit() {
 /// permitted here. If no lateral offsets were permitted, the y of the fitted interferer would always be positive.
 #[test]
 fn with_lateral_range_the_fit_is_on_the_right_side() {
-    let source = |x_m: f64, y_m: f64| Source {
-        power_w: 50.0,
-        x_m,
-        y_m,
-    };
+    let source = |x_m: f64, y_m: f64| make::source(50.0, x_m, y_m);
     for side in [-1.0, 1.0] {
         let scenario = Scenario {
             lateral_min_m: -200.0,

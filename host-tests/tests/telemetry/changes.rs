@@ -9,6 +9,7 @@ use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::setup::UploadSpec;
 
 use crate::{Figures, RATE, quantile, s, seconds, setup};
+use host_tests::make;
 
 /// Control states, each with a flag. The flag is true if the autopilot flies to a target other than the setpoint.
 const STATES: [(State, bool); 6] = [
@@ -33,11 +34,7 @@ fn report(chain: &Chain, relay: u16) -> Option<Report> {
 fn place(rng: &mut ChaCha8Rng) -> Placement {
     let [x_m, y_m, altitude_m] =
         [800, 40, 120].map(|quarters| rng.random_range(0..quarters) as f32 / 4.0);
-    Placement {
-        x_m,
-        y_m,
-        altitude_m,
-    }
+    make::placement(x_m, y_m, altitude_m)
 }
 
 /// Checks that a position that the autopilot gives a relay only once still reaches the station.

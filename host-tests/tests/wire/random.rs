@@ -1,5 +1,6 @@
 //! Random messages and bytes: the crate and the second codec agree.
 
+use host_tests::make;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -8,7 +9,7 @@ use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::Ladder;
 use uav_relay::place::{CrossSection, Station};
 use uav_relay::wire::auth::TAG;
-use uav_relay::wire::frame::{self, FrameError, Header, MAX_FRAME};
+use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{Message, MessageError, Sweep};
 use uav_relay_decode::envelope::{before, sealed, stuffed, unsigned};
 
@@ -174,12 +175,7 @@ fn node_numbers_out_of_range_are_not_encoded() {
     let message = Message::Busy { number: 1 };
     for (number, fits) in [(4094, true), (4095, false), (4096, false), (65535, false)] {
         for [sender, destination] in [[number, 2], [1, number]] {
-            let header = Header {
-                network: 7,
-                sender,
-                destination,
-                counter: 3,
-            };
+            let header = make::header(sender, destination, 3);
             let len = frame::encode(header, &message, &mut [0; MAX_FRAME]);
             assert_eq!(len, if fits { 19 } else { 0 }, "{number}");
         }
