@@ -8,7 +8,7 @@ use uav_relay::Placement;
 use uav_relay_scenario::link::Access;
 use uav_relay_scenario::{Interference, PlannedMethod};
 use uav_relay_tools::plan::flown::flown;
-use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
+use uav_relay_tools::plan::{Plan, PlanRequest, plan};
 
 use super::check_limits;
 use super::scenes::{Case, TOLERANCE, number};
@@ -45,12 +45,7 @@ fn plans_against_several_interferers_are_compared_by_their_rates() {
     for seed in first..first + all {
         let case = draw(seed);
         let what = format!("SEED={seed}: {case:?}");
-        let ask = PlanRequest {
-            number: Number::Of(case.relays),
-            free_altitude: true,
-            x_m: None,
-            tolerance: TOLERANCE,
-        };
+        let ask = PlanRequest::of(case.relays, true, TOLERANCE);
         let places = |plan: &Plan| {
             plan.places
                 .iter()

@@ -254,12 +254,7 @@ fn plans_beside_the_line_have_the_stated_sir() {
             ..scenario(&mut rng)
         };
         let relays = rng.random_range(1..=8);
-        let ask = PlanRequest {
-            number: Number::Of(relays),
-            free_altitude: true,
-            x_m: None,
-            tolerance: 1e-4,
-        };
+        let ask = PlanRequest::of(relays, true, 1e-4);
         let corridor = Corridor {
             least_m: scenario.altitude_min_m,
             most_m: scenario.altitude_max_m,
