@@ -1,9 +1,9 @@
 //! Random flights with failsafes, restarts, delays and pilots: no drone is engaged without its pilot.
 
-use host_tests::make;
 use std::collections::VecDeque;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::Duration;

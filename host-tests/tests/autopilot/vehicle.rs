@@ -1,5 +1,6 @@
 //! Simulated vehicle with a PX4 or ArduCopter: it hovers, or flies to the companion's last target.
 
+use host_tests::make;
 use mavlink::dialects::common::{
     COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, MavLandedState,
     MavMessage, POSITION_TARGET_GLOBAL_INT_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
@@ -13,7 +14,6 @@ use uav_relay::flight::mavlink::frame;
 use uav_relay::{Geodetic, Instant, Placement, Sites};
 
 use crate::signed::Key;
-use host_tests::make;
 
 pub(crate) const SYSTEM: u8 = 7;
 

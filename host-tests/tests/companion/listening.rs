@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use host_tests::make;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
 
 use crate::files::{Files, write};
 use crate::flying::Flight;
 use crate::process::{Relay, bits};
-use host_tests::make;
 
 const LISTENING: &str = "--listen --interferer unknown --listen-every 0.5";
 

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
 
+use host_tests::make;
 use rustix::process::Signal;
 use serde_json::Value;
 use uav_relay_scenario::Scenario;
@@ -14,7 +15,6 @@ use crate::datagrams::Ports;
 use crate::files::{Files, status_of, until, write};
 use crate::medium::{Medium, QUIET};
 use crate::process::{LIMIT, Relay};
-use host_tests::make;
 
 /// Returns the command-line options of the relay or ground station at `tty`.
 ///

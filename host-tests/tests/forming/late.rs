@@ -1,11 +1,11 @@
 //! Late frames from before a reboot, or of an earlier view.
 
+use host_tests::make;
 use uav_relay::wire::message::Message;
 use uav_relay::{Local, Method, Settings};
 
 use crate::hand::{Chain, LOW, WIDE, is_stop};
 use host_tests::bench::Bench;
-use host_tests::make;
 
 /// Checks that a delayed message from before the leader's reboot does not spoil the next agreement.
 ///

@@ -13,6 +13,7 @@
 //! | uploads | the line turns by up to 85 degrees once in 50 % of the flights, received by each relay up to 5 s late |
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::flight::autopilot::carrot::Pace;
@@ -25,7 +26,6 @@ use uav_relay_sim::simulator::drones::Point;
 use crate::drone::{instant, length, node, way};
 use crate::medium::{Faults, Medium};
 use crate::world::beside;
-use host_tests::make;
 
 const STEP_S: f64 = 0.1;
 const SPEED: f64 = 5.0;

@@ -1,9 +1,9 @@
 //! Simulated drone: its motion, its flight controller's setpoints and reports, and its guard.
 
-use host_tests::make;
 use std::collections::VecDeque;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::RngExt;
 use uav_relay::GuardConfig;
 use uav_relay::guard::Guard;

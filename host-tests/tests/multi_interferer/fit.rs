@@ -1,9 +1,9 @@
 //! Hypothetical interferer in known cases: published values, one source, sources at one position.
 
-use host_tests::make;
 use std::time::Instant;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::SeedableRng;
 use uav_relay_oracle::cases::{self, Case};
 use uav_relay_oracle::random::seed;

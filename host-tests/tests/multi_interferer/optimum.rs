@@ -1,9 +1,9 @@
 //! Best chain at one altitude, and best such altitude.
 
-use host_tests::make;
 use std::time::Instant;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::SeedableRng;
 use uav_relay_oracle::random::{self, Chain, seed};
 use uav_relay_oracle::reference::Link;

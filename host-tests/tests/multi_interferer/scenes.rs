@@ -17,10 +17,10 @@
 //! Aloof sources are 0.3 D to D beside the line, with powers of 50 to 100 times a relay's. Such similar sources are the case for
 //! which the paper replaces them by one hypothetical interferer.
 
-use host_tests::make;
 use std::ops::RangeInclusive;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::RngExt;
 use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::log_uniform;

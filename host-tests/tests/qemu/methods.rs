@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use host_tests::make;
 use uav_relay::{Adjust, Method};
 use uav_relay_scenario::{BetaPoint, Field, Interference, Noise, Scenario};
 use uav_relay_sim::simulator::faults::Faults;
@@ -9,7 +10,6 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
-use host_tests::make;
 
 /// Returns a flight of five relays past an interferer at (500, `y_m`) m. Lateral offsets are up to `aside_m`. `held`
 /// has the number and the altitude of a relay that keeps this altitude.

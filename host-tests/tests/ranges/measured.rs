@@ -1,6 +1,7 @@
 //! Measured powers at drones' positions. For any inputs the chain agrees, also after the sensors recover.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use uav_relay::{
@@ -11,7 +12,6 @@ use uav_relay::{
 use crate::draw::{mission, scaled, settings, signed};
 use crate::each;
 use crate::line::{check, has_agreed, line};
-use host_tests::make;
 
 /// Draws a measured power, W: any float, but mostly in the accepted range.
 fn power_w(rng: &mut ChaCha8Rng) -> f32 {

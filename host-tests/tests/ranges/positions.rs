@@ -1,6 +1,7 @@
 //! Positions, control and clocks of guarded relays. Numbers stay finite, and with true inputs the chain agrees.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::GuardConfig;
 use uav_relay::{Duration, Instant, Mission, Placement, Settings, Side};
@@ -8,7 +9,6 @@ use uav_relay::{Duration, Instant, Mission, Placement, Settings, Side};
 use crate::draw::signed;
 use crate::each;
 use crate::line::{check, has_agreed, line};
-use host_tests::make;
 
 /// Draws a position anywhere, more often near the line.
 fn anywhere(rng: &mut ChaCha8Rng) -> Placement {

@@ -1,8 +1,8 @@
 //! Meaning of a valid file.
 
-use host_tests::make;
 use std::collections::BTreeMap;
 
+use host_tests::make;
 use uav_relay_scenario::{AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise};
 
 use super::*;

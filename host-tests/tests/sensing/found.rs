@@ -1,5 +1,6 @@
 //! Static sources: fraction of the optimum by number of agreements.
 
+use host_tests::make;
 use uav_relay::Interference;
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_tools::figures::sheet::FigureError;
@@ -8,7 +9,6 @@ use uav_relay_tools::listening::{
 };
 
 use crate::count;
-use host_tests::make;
 
 type Setups = fn(&RandomScene) -> Result<Setup, FigureError>;
 

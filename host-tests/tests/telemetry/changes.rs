@@ -1,6 +1,7 @@
 //! Changes of a relay's state: each reaches the station in time, and the last one always.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Duration, GuardConfig, Instant, Placement, Report, Side, Upload};
@@ -9,7 +10,6 @@ use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::setup::UploadSpec;
 
 use crate::{Figures, RATE, quantile, s, seconds, setup};
-use host_tests::make;
 
 /// Control states, each with a flag. The flag is true if the autopilot flies to a target other than the setpoint.
 const STATES: [(State, bool); 6] = [

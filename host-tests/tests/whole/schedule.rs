@@ -1,12 +1,12 @@
 //! Random schedules that mix all faults.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::{Interference, Interferer, Upload, Wiring};
 
 use super::air::{Air, Kind, ScheduledEvent};
 use host_tests::fixtures::mission;
-use host_tests::make;
 
 pub(crate) const SECOND: u64 = 1_000_000;
 
