@@ -138,7 +138,6 @@ fn utm_grids_have_the_heights_of_an_independent_projection() {
 }
 
 #[test]
-#[expect(clippy::too_many_lines, reason = "a list of files and their errors")]
 fn unusable_files_and_places_are_named() {
     let folder = folder();
     let file = |name: &str| folder.path().join(name);
