@@ -76,7 +76,7 @@ const SCRIPT: [&str; 14] = [
     "no quorum 0",
 ];
 
-/// Returns the fault of an entry in [`SCRIPT`], with the alarm on the page and the log line that the test expects.
+/// Returns the fault of an entry in [`SCRIPT`], with its alarm on the page and its log line.
 fn fault(entry: &'static str) -> Fault {
     const RELEASED: &str = "warning relay # released";
     let (what, relay) = entry.rsplit_once(' ').unwrap();

@@ -14,7 +14,7 @@ struct Row {
     range: &'static str,
 }
 
-/// Numeric keys: the key's path, the lines of its table with `@` for the value, four values, and the stated range.
+/// Numeric keys: path, lines of the table with `@` for the value, four values, and the stated range.
 ///
 /// The values are one below the range, its limits, and one above. Semicolons end lines.
 const KEYS: &str = r#"
