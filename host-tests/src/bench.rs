@@ -11,11 +11,12 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;
 use uav_relay::wire::message::Message;
 use uav_relay::{
-    Auth, Duration, Event, Ground, Identity, Instant, MAX_FRAME, Mission, Phase, Placement, Port,
-    Relay, Settings, Side, Wiring,
+    Auth, Duration, Event, Ground, Instant, MAX_FRAME, Mission, Phase, Placement, Port, Relay,
+    Settings, Side, Wiring,
 };
 
 use crate::fixtures::NETWORK;
+use crate::make;
 
 /// Maximum number of frames delivered at one instant.
 ///
@@ -104,10 +105,7 @@ impl Bench {
     /// A relay rejects its settings.
     pub fn of(mission: Mission, settings: impl Fn(u16) -> Settings) -> Self {
         let relay = |index| {
-            let identity = Identity {
-                network: NETWORK,
-                index,
-            };
+            let identity = make::identity(index);
             let seed = u32::from(index);
             Relay::new(mission, identity, settings(index), seed, Instant::ZERO).unwrap()
         };

@@ -1,6 +1,7 @@
 //! Common fixtures of tests: the paper's chain, and one relay of a chain.
 
-use uav_relay::{Identity, Instant, Mission, MissionConfig, Relay, Settings, ViewRecord, Wiring};
+use crate::make;
+use uav_relay::{Instant, Mission, MissionConfig, Relay, Settings, ViewRecord, Wiring};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::Scenario;
@@ -35,10 +36,7 @@ pub fn paper(relays: u16) -> MissionConfig {
 /// # Panics
 /// The mission has no such relay, or the relay rejects the settings.
 pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
-    let identity = Identity {
-        network: NETWORK,
-        index,
-    };
+    let identity = make::identity(index);
     Relay::new(mission, identity, settings, u32::from(index), Instant::ZERO).unwrap()
 }
 

@@ -1,7 +1,7 @@
 //! Simulated flights shared by tests: eight drones in a row, heavy faults, and ends of a run.
 
 use rand::RngExt;
-use uav_relay::{Band, Duration, GuardConfig, Instant, Mission, MissionConfig, Profile};
+use uav_relay::{Duration, GuardConfig, Instant, Mission, MissionConfig, Profile};
 use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::drones::{FlightSpec, Point};
@@ -10,6 +10,7 @@ use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 use crate::fixtures::mission;
+use crate::make;
 
 /// Returns the time `seconds` after the start.
 pub const fn seconds(seconds: u64) -> Instant {
@@ -116,10 +117,7 @@ pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     let own = (1..=8).map(|index| {
         let power_w = rng.random_range(0.5..2.0);
         let altitude_m = rng.random_range(15.0..40.0);
-        let own = Profile {
-            altitude_m,
-            power_w,
-        };
+        let own = make::profile(altitude_m, power_w);
         (index, own)
     });
     own.collect()
@@ -140,14 +138,8 @@ pub fn bad_day(rng: &mut impl RngExt) -> Faults {
 /// Returns `None` if this mission is not valid.
 pub fn with_room(config: &MissionConfig, corridor: Corridor) -> Option<Mission> {
     let config = MissionConfig {
-        band: Band {
-            least_m: corridor.least_m as f32,
-            most_m: corridor.most_m as f32,
-        },
-        lateral: Band {
-            least_m: corridor.left_m as f32,
-            most_m: corridor.right_m as f32,
-        },
+        band: make::band(corridor.least_m as f32, corridor.most_m as f32),
+        lateral: make::band(corridor.left_m as f32, corridor.right_m as f32),
         ..*config
     };
     Mission::try_new(config).ok()

@@ -6,6 +6,7 @@
 //! | [`fixtures`], [`flights`] | missions, relays, and simulated flights that several tests use |
 //! | [`ledger`] | random schedules of faults for simulated chains, and the judgement of their results |
 //! | [`placing`] | comparison of the crate's positions with the f64 reference |
+//! | [`mod@make`] | constructors of small values, such as positions |
 //! | [`firmware`] | firmware images, their flash, and emulated drones |
 //! | [`python`] | independent peers in Python |
 
@@ -22,6 +23,8 @@ pub mod fixtures;
 pub mod flights;
 #[cfg(not(target_os = "none"))]
 pub mod ledger;
+#[cfg(not(target_os = "none"))]
+pub mod make;
 #[cfg(not(target_os = "none"))]
 pub mod placing;
 #[cfg(target_os = "linux")]

@@ -1,5 +1,6 @@
 //! Comparison of the crate's positions with the f64 reference, without and with noise.
 
+use crate::make;
 use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
 use uav_relay::optimiser::plan::{self, Agreed};
@@ -7,7 +8,7 @@ use uav_relay::optimiser::spacing::Hop;
 use uav_relay::sir::Sender;
 use uav_relay::{Mission, Placement, Profile, Schedule};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
-use uav_relay_oracle::random::{self, Chain, Style, in_noise};
+use uav_relay_oracle::random::{self, Chain, in_noise};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::Place;
 use uav_relay_sim::report::{hop_sirs, place};
@@ -194,10 +195,7 @@ pub struct DrawnHop {
 ///
 /// `None` if a relay would reject the chain's mission.
 pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
-    let style = Style {
-        relays: 1..=4,
-        chain: Chain::Any,
-    };
+    let style = make::style(1..=4, Chain::Any);
     let mut link = as_relays_know_it(&random::link(rng, &style));
     if noisy {
         link = as_relays_know_it(&in_noise(rng, &link));

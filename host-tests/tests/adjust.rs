@@ -4,11 +4,12 @@ use core::task::Poll;
 
 use chacha20::ChaCha8Rng;
 use host_tests::flights::settle;
+use host_tests::make;
 use host_tests::placing::{reference, setpoints};
 use rand::{RngExt, SeedableRng};
 use uav_relay::optimiser::local::{HopEnd, Hops, LocalSearch};
 use uav_relay::sir::{Sender, at_receiver};
-use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig, Placement, Profile};
+use uav_relay::{Adjust, Local, Method, Mission, MissionConfig, Placement};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random;
 use uav_relay_oracle::reference::Link;
@@ -29,10 +30,7 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     }
     let (mission, _) = of_link(&link, 1e-4).unwrap();
     let config = MissionConfig {
-        band: Band {
-            least_m: 20.0,
-            most_m: 300.0,
-        },
+        band: make::band(20.0, 300.0),
         ..*mission.config()
     };
     let mut setup = Setup::new(Mission::try_new(config).unwrap());
@@ -71,14 +69,7 @@ fn rises(outcome: &Outcome) -> bool {
 #[test]
 fn fine_search_gains_sir_over_a_coarse_grid() {
     let of = |rounds, local| {
-        let (link, setup) = setup(
-            50,
-            Adjust {
-                rounds,
-                explore_m: 10.0,
-                local,
-            },
-        );
+        let (link, setup) = setup(50, make::adjust(rounds, 10.0, local));
         let outcome = settle(setup);
         let (sir, apart) = judged(&link, &outcome);
         println!(
@@ -245,17 +236,10 @@ fn adjusting_ends_in_a_local_optimum() {
         rows: 11,
     };
     for relays in 2..8 {
-        let adjust = Adjust {
-            rounds: 2_000,
-            explore_m: 10.0,
-            local,
-        };
+        let adjust = make::adjust(2_000, 10.0, local);
         let (_, mut setup) = setup(relays, adjust);
         // The start is far from the final positions, except perhaps for the first relay.
-        let low = Profile {
-            altitude_m: 60.0,
-            power_w: 1.0,
-        };
+        let low = make::profile(60.0, 1.0);
         setup.profiles.push((relays as u16, low));
         let mission = setup.mission;
         let outcome = settle(setup);
@@ -293,11 +277,7 @@ fn relays_keep_their_separation_where_it_costs_sir() {
             rows: 21,
         },
     ] {
-        let adjust = Adjust {
-            rounds: 60,
-            explore_m: 30.0,
-            local,
-        };
+        let adjust = make::adjust(60, 30.0, local);
         let (link, mut setup) = setup(12, adjust);
         let config = MissionConfig {
             min_separation_m: 24.0,

@@ -1,10 +1,11 @@
 //! Baseline placements, compared with values of a separate program and with brute force.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::SeedableRng;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::scene_of;
-use uav_relay_oracle::random::{self, Chain, Style};
+use uav_relay_oracle::random::{self, Chain};
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_tools::baseline::{blind_places, equal_places, mean};
@@ -97,10 +98,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(11));
     let mut capped = 0;
     for (relays, points, links) in [(1, 2000, 60), (2, 200, 60), (3, 60, 30)] {
-        let style = Style {
-            relays: relays..=relays,
-            chain: Chain::Alike,
-        };
+        let style = make::style(relays..=relays, Chain::Alike);
         for _ in 0..links {
             let link = random::link(&mut rng, &style);
             let places = blind_places(&scene(&link));

@@ -3,8 +3,9 @@
 use chacha20::ChaCha8Rng;
 use host_tests::fixtures::mission;
 use host_tests::flights::settle;
+use host_tests::make;
 use rand::SeedableRng;
-use uav_relay::{Duration, Instant, Profile, Schedule, Side};
+use uav_relay::{Duration, Instant, Schedule, Side};
 use uav_relay_oracle::cases::OPTIMA;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain as Kind, Style};
@@ -134,13 +135,7 @@ fn silent_places_equal_those_by_messages() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(22));
     let mut compared = 0;
     while compared < 60 {
-        let link = as_relays_know_it(&random::link(
-            &mut rng,
-            &Style {
-                relays: 1..=20,
-                chain: Kind::Alike,
-            },
-        ));
+        let link = as_relays_know_it(&random::link(&mut rng, &make::style(1..=20, Kind::Alike)));
         let Some((mission, _)) = of_link(&link, 1e-4) else {
             continue;
         };
@@ -284,10 +279,7 @@ fn a_chain_of_different_relays_is_solved_exactly() {
     let mission = mission(8);
     let profiles = [(3, 30.0, 0.5), (5, 20.0, 4.0), (8, 35.0, 1.0)];
     let profiles = profiles.map(|(index, altitude_m, power_w)| {
-        let profile = Profile {
-            altitude_m,
-            power_w,
-        };
+        let profile = make::profile(altitude_m, power_w);
         (index, profile)
     });
     let mut link = Link::paper(8);

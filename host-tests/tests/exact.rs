@@ -2,6 +2,7 @@
 //!
 //! The chains are not best with all relays at their farthest x. `COUNT` and `SEED` select other scenes.
 
+use host_tests::make;
 use host_tests::placing::{generator, profile_of, setpoints, xs};
 use rand::{Rng, RngExt};
 use uav_relay::optimiser::PerTarget;
@@ -10,8 +11,8 @@ use uav_relay::optimiser::plan;
 use uav_relay::{Mission, Placement, Profile, Schedule};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
@@ -179,10 +180,7 @@ fn near_optimal_at_mixed_altitudes() {
     let mut rng = generator(901);
     let mut tally = Tally::default();
     while tally.scenes < count(1000) {
-        let style = Style {
-            relays: 2..=50,
-            chain: Chain::Own,
-        };
+        let style = make::style(2..=50, Chain::Own);
         let link = as_relays_know_it(&random::link(&mut rng, &style));
         let (Some((mission, own)), Some(best)) = (of_link(&link, 1e-4), link.optimum()) else {
             continue;
@@ -242,10 +240,10 @@ fn near_optimal_with_a_separation() {
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
-    let relay = Relay {
-        altitude_m: round(d * log_uniform(rng, 0.005, 0.1)),
-        power_w: round(log_uniform(rng, 0.1, 10.0)),
-    };
+    let relay = make::reference_relay(
+        round(d * log_uniform(rng, 0.005, 0.1)),
+        round(log_uniform(rng, 0.1, 10.0)),
+    );
     let mu_los = log_uniform(rng, 1.0, 1e4);
     let base = mu_los * d * d / (relay.power_w * (relays * relays) as f64);
     let (points, spread) = (rng.random_range(2..=12), log_uniform(rng, 1.5, 300.0));
@@ -306,10 +304,11 @@ fn near_optimal_in_uneven_fields_by_unlike_relays() {
             continue;
         };
         let own: Vec<(u16, Profile)> = (1..)
-            .zip(link.relays.iter().map(|relay| Profile {
-                altitude_m: relay.altitude_m as f32,
-                power_w: relay.power_w as f32,
-            }))
+            .zip(
+                link.relays
+                    .iter()
+                    .map(|relay| make::profile(relay.altitude_m as f32, relay.power_w as f32)),
+            )
             .collect();
         let best = link.best_apart(apart_m);
         if !(best > 0.0) {
@@ -335,10 +334,7 @@ fn chains_agree_by_messages_on_feasible_targets() {
     let mut rng = generator(904);
     let (mut settled, mut near, mut most) = (0, 0, 0);
     while settled < 60.min(count(1000)) {
-        let style = Style {
-            relays: 2..=16,
-            chain: Chain::Own,
-        };
+        let style = make::style(2..=16, Chain::Own);
         let free = random::link(&mut rng, &style);
         let even = free.distance_m / free.len() as f64;
         let link = as_relays_know_it(&Link {

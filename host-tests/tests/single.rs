@@ -1,11 +1,11 @@
 //! Corrected Algorithm 3 for one relay in a field, compared with a dense search in f64.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{Rng, RngExt, SeedableRng};
 use uav_relay::Mission;
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
-use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_tools::single::without_interferer::{best_in_field, stepped};
 
@@ -20,10 +20,7 @@ fn link(d: f64, h: f64, tx_w: f64, power_w: f64, upsilon: Vec<(f64, f64)>) -> St
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Relay {
-            altitude_m: h,
-            power_w,
-        }],
+        relays: vec![make::reference_relay(h, power_w)],
     }
 }
 

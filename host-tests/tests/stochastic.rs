@@ -1,14 +1,15 @@
 //! Algorithm 4: positions in a field of interference by messages from Rx toward Tx. The field is configured or measured.
 
 use host_tests::flights::{settle, unharmed};
+use host_tests::make;
 use host_tests::placing::{generator, setpoints, xs};
 use rand::{Rng, RngExt};
 use uav_relay::optimiser::retreat::Retreat;
-use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
+use uav_relay::{Interference, Measure, Mission, Schedule};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::log_uniform;
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
@@ -23,10 +24,10 @@ fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
 fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
-    let relay = Relay {
-        altitude_m: round(d * log_uniform(rng, 0.005, 0.1)),
-        power_w: round(log_uniform(rng, 0.1, 10.0)),
-    };
+    let relay = make::reference_relay(
+        round(d * log_uniform(rng, 0.005, 0.1)),
+        round(log_uniform(rng, 0.1, 10.0)),
+    );
     let mu_los = log_uniform(rng, 1.0, 1e4);
     let eta = mu_los * log_uniform(rng, 1.0, 1.9);
     // This unit of Upsilon makes the SIRs about 1.
@@ -161,10 +162,7 @@ fn different_relays_meet_the_agreed_target_in_a_field() {
             let relay = &mut link.relays[index - 1];
             relay.altitude_m = f64::from((relay.altitude_m * rng.random_range(0.6..1.6)) as f32);
             relay.power_w = f64::from((relay.power_w * log_uniform(&mut rng, 0.2, 5.0)) as f32);
-            let own = Profile {
-                altitude_m: relay.altitude_m as f32,
-                power_w: relay.power_w as f32,
-            };
+            let own = make::profile(relay.altitude_m as f32, relay.power_w as f32);
             setup.profiles.push((index as u16, own));
         }
         let outcome = settle(setup);

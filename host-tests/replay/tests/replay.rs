@@ -316,34 +316,25 @@ fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
     let fleet = folder.path().join("other");
     std::fs::create_dir(&fleet).unwrap();
     let other = captures(&fly(4, false, 20, None), &fleet, 4, f64::INFINITY);
+    let text = write("text.pcapng", b"x_m,y_m\n1,2\n");
+    let cut = write("cut.pcapng", &whole[..100]);
+    let ethernet = write("ethernet.pcapng", &ethernet);
+    let noise = write("noise.pcapng", &noise.finish().unwrap());
+    let absent = folder.path().join("absent.pcapng");
+    let part = write("part.pcapng", &first[..first.len() / 2]);
     for (file, why) in [
         (write("empty.pcapng", &[]), "has no frames of relays"),
+        (text, "is not a capture (pcapng)"),
         (
-            write("text.pcapng", b"x_m,y_m\n1,2\n"),
-            "is not a capture (pcapng)",
-        ),
-        (
-            write("cut.pcapng", &whole[..100]),
+            cut,
             "is not a valid capture: the file ends inside a pcapng block",
         ),
-        (
-            write("ethernet.pcapng", &ethernet),
-            "has no frames of relays",
-        ),
-        (
-            write("noise.pcapng", &noise.finish().unwrap()),
-            "is an intact frame of a relay",
-        ),
-        (
-            folder.path().join("absent.pcapng"),
-            "cannot be read: No such file or directory",
-        ),
+        (ethernet, "has no frames of relays"),
+        (noise, "is an intact frame of a relay"),
+        (absent, "cannot be read: No such file or directory"),
         (other[2].clone(), "the files are of different chains"),
         (write("again.pcapng", &first), "is the same capture as"),
-        (
-            write("part.pcapng", &first[..first.len() / 2]),
-            "is the same capture as",
-        ),
+        (part, "is the same capture as"),
         (
             next_day,
             "24.0 h apart from them by its clock: not of the same flight",

@@ -47,6 +47,17 @@ static PAGE: LazyLock<String> = LazyLock::new(|| {
     page.replacen("<link rel=\"stylesheet\" href=\"/screen.css\">", &style, 1)
 });
 
+/// Returns the entry in [`FILES`] of a file in the folder `web`.
+macro_rules! file {
+    ($name:literal, $kind:literal) => {
+        (
+            concat!("/", $name),
+            $kind,
+            include_str!(concat!("../web/", $name)),
+        )
+    };
+}
+
 /// Files of the page: path, media type and content. The path of the page itself is `/`.
 pub const FILES: [(&str, &str, &str); 8] = [
     (
@@ -54,41 +65,13 @@ pub const FILES: [(&str, &str, &str); 8] = [
         "text/html; charset=utf-8",
         include_str!("../web/index.html"),
     ),
-    (
-        "/screen.css",
-        "text/css; charset=utf-8",
-        include_str!("../web/screen.css"),
-    ),
-    (
-        "/map.js",
-        "text/javascript; charset=utf-8",
-        include_str!("../web/map.js"),
-    ),
-    (
-        "/profile.js",
-        "text/javascript; charset=utf-8",
-        include_str!("../web/profile.js"),
-    ),
-    (
-        "/alarms.js",
-        "text/javascript; charset=utf-8",
-        include_str!("../web/alarms.js"),
-    ),
-    (
-        "/desk.js",
-        "text/javascript; charset=utf-8",
-        include_str!("../web/desk.js"),
-    ),
-    (
-        "/screen.js",
-        "text/javascript; charset=utf-8",
-        include_str!("../web/screen.js"),
-    ),
-    (
-        "/icon.svg",
-        "image/svg+xml",
-        include_str!("../web/icon.svg"),
-    ),
+    file!("screen.css", "text/css; charset=utf-8"),
+    file!("map.js", "text/javascript; charset=utf-8"),
+    file!("profile.js", "text/javascript; charset=utf-8"),
+    file!("alarms.js", "text/javascript; charset=utf-8"),
+    file!("desk.js", "text/javascript; charset=utf-8"),
+    file!("screen.js", "text/javascript; charset=utf-8"),
+    file!("icon.svg", "image/svg+xml"),
 ];
 
 /// Path of the stream of snapshots.
@@ -514,88 +497,52 @@ mod tests {
 
     #[test]
     fn only_the_own_host_and_origin_get_the_page() {
-        for (lines, expected) in [
-            ("GET / HTTP/1.1\nHost: 127.0.0.1:8080", 200),
-            ("GET /?a HTTP/1.1\nHost: localhost:8080", 200),
-            (
-                "GET /events HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: http://127.0.0.1:8080",
-                200,
-            ),
-            ("GET / HTTP/1.1\nHost: 127.0.0.1", 403),
-            ("GET / HTTP/1.1\nHost: 127.0.0.1:8081", 403),
-            ("GET / HTTP/1.1\nHost: 127.0.0.1:+8080", 403),
-            ("GET / HTTP/1.1\nHost: evil.example:8080", 403),
-            ("GET / HTTP/1.1\nHost: 127.0.0.2:8080", 403),
-            (
-                "GET / HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: http://evil.example",
-                403,
-            ),
-            (
-                "GET / HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: https://127.0.0.1:8080",
-                403,
-            ),
-            ("GET / HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: null", 403),
-            (
-                "GET / HTTP/1.1\nHost: localhost:8080\nOrigin: http://127.0.0.1:8080",
-                403,
-            ),
-            (
-                "GET / HTTP/1.1\nHost: 127.0.0.1:8080\nHost: 127.0.0.1:8080",
-                400,
-            ),
-            ("GET / HTTP/1.1", 400),
-            ("POST / HTTP/1.1\nHost: 127.0.0.1:8080", 405),
-            ("HEAD / HTTP/1.1\nHost: 127.0.0.1:8080", 405),
-            (
-                "GET / HTTP/1.1\nHost: 127.0.0.1:8080\nContent-Length: 4",
-                400,
-            ),
-            (
-                "GET / HTTP/1.1\nHost: 127.0.0.1:8080\nTransfer-Encoding: chunked",
-                400,
-            ),
-            ("GET /../Cargo.toml HTTP/1.1\nHost: 127.0.0.1:8080", 404),
-            (
-                "GET http://127.0.0.1:8080/ HTTP/1.1\nHost: 127.0.0.1:8080",
-                404,
-            ),
+        for row in [
+            "200 GET / HTTP/1.1\nHost: 127.0.0.1:8080",
+            "200 GET /?a HTTP/1.1\nHost: localhost:8080",
+            "200 GET /events HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: http://127.0.0.1:8080",
+            "403 GET / HTTP/1.1\nHost: 127.0.0.1",
+            "403 GET / HTTP/1.1\nHost: 127.0.0.1:8081",
+            "403 GET / HTTP/1.1\nHost: 127.0.0.1:+8080",
+            "403 GET / HTTP/1.1\nHost: evil.example:8080",
+            "403 GET / HTTP/1.1\nHost: 127.0.0.2:8080",
+            "403 GET / HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: http://evil.example",
+            "403 GET / HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: https://127.0.0.1:8080",
+            "403 GET / HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: null",
+            "403 GET / HTTP/1.1\nHost: localhost:8080\nOrigin: http://127.0.0.1:8080",
+            "400 GET / HTTP/1.1\nHost: 127.0.0.1:8080\nHost: 127.0.0.1:8080",
+            "400 GET / HTTP/1.1",
+            "405 POST / HTTP/1.1\nHost: 127.0.0.1:8080",
+            "405 HEAD / HTTP/1.1\nHost: 127.0.0.1:8080",
+            "400 GET / HTTP/1.1\nHost: 127.0.0.1:8080\nContent-Length: 4",
+            "400 GET / HTTP/1.1\nHost: 127.0.0.1:8080\nTransfer-Encoding: chunked",
+            "404 GET /../Cargo.toml HTTP/1.1\nHost: 127.0.0.1:8080",
+            "404 GET http://127.0.0.1:8080/ HTTP/1.1\nHost: 127.0.0.1:8080",
         ] {
-            assert_eq!(status(lines), expected, "{lines}");
+            let (expected, lines) = row.split_once(' ').unwrap();
+            assert_eq!(status(lines).to_string(), expected, "{lines}");
         }
     }
 
     #[test]
     fn foreign_pages_may_only_link_to_the_page() {
-        for (path, headers, expected) in [
-            ("/events", "Sec-Fetch-Site: same-origin", 200),
-            ("/", "Sec-Fetch-Site: none\nSec-Fetch-Mode: navigate", 200),
-            ("/icon.svg", "Sec-Fetch-Site: cross-site", 403),
-            (
-                "/events",
-                "Sec-Fetch-Site: same-site\nSec-Fetch-Mode: no-cors",
-                403,
-            ),
-            (
-                "/events",
-                "Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: navigate",
-                403,
-            ),
-            (
-                "/",
-                "Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: no-cors",
-                403,
-            ),
-            ("/", "Sec-Fetch-Site: cross-site", 403),
-            ("/", "Sec-Fetch-Site: ", 403),
-            ("/", "Sec-Fetch-Site: none\nSec-Fetch-Site: cross-site", 403),
-            (
-                "/?a",
-                "Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: navigate",
-                200,
-            ),
+        for row in [
+            "200 /events Sec-Fetch-Site: same-origin",
+            "200 / Sec-Fetch-Site: none\nSec-Fetch-Mode: navigate",
+            "403 /icon.svg Sec-Fetch-Site: cross-site",
+            "403 /events Sec-Fetch-Site: same-site\nSec-Fetch-Mode: no-cors",
+            "403 /events Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: navigate",
+            "403 / Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: no-cors",
+            "403 / Sec-Fetch-Site: cross-site",
+            "403 / Sec-Fetch-Site: ",
+            "403 / Sec-Fetch-Site: none\nSec-Fetch-Site: cross-site",
+            "200 /?a Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: navigate",
         ] {
+            let [expected, path, headers] = row.splitn(3, ' ').collect::<Vec<_>>()[..] else {
+                panic!("{row}");
+            };
             let lines = format!("GET {path} HTTP/1.1\nHost: 127.0.0.1:8080\n{headers}");
-            assert_eq!(status(&lines), expected, "{lines}");
+            assert_eq!(status(&lines).to_string(), expected, "{lines}");
         }
     }
 

@@ -9,7 +9,6 @@ mod flying;
 mod hour;
 mod medium;
 mod soak;
-mod table;
 
 use std::collections::BTreeMap;
 

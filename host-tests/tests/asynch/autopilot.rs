@@ -12,6 +12,7 @@ use embedded_io_async::{ErrorType, Read, Write};
 use futures_executor::LocalPool;
 use futures_util::task::LocalSpawnExt as _;
 use host_tests::fixtures;
+use host_tests::make;
 use mavlink::dialects::common::{
     COMMAND_LONG_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA,
     MavAutopilot, MavCmd, MavLandedState, MavMessage, MavModeFlag, MavState, MavType,
@@ -194,11 +195,7 @@ async fn fly(vehicle: &Vehicle, time: &Time, mut to: Uart, from: Uart) -> Infall
 }
 
 fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
-    Geodetic {
-        lat_e7: target.lat_int,
-        lon_e7: target.lon_int,
-        amsl_mm: (target.alt * 1e3) as i32,
-    }
+    make::geodetic(target.lat_int, target.lon_int, (target.alt * 1e3) as i32)
 }
 
 /// Creates relay 1 of `relays`, with surveyed positions of Tx and Rx.

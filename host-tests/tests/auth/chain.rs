@@ -2,6 +2,7 @@
 
 use host_tests::fixtures::{self, mission};
 use host_tests::flights::settle;
+use host_tests::make;
 use uav_relay::{Adjust, Auth, Instant, Key, Method, Phase, Settings, Stats, Wiring};
 use uav_relay_oracle::random::seed;
 use uav_relay_scenario::Scenario;
@@ -12,10 +13,7 @@ use uav_relay_sim::simulator::setup::Setup;
 use super::net::{KEY, Net, ScheduledEvent};
 
 fn signed(mut setup: Setup) -> Setup {
-    setup.settings.auth = Some(Auth {
-        key: Key::new(KEY),
-        epoch: 1,
-    });
+    setup.settings.auth = Some(make::auth(KEY, 1));
     setup
 }
 

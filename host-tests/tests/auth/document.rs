@@ -1,7 +1,8 @@
 //! Vectors of frames with a tag, byte by byte.
 
 use host_tests::fixtures::{self, NETWORK, mission};
-use uav_relay::{Auth, Instant, Key, Port, Settings};
+use host_tests::make;
+use uav_relay::{Instant, Key, Port, Settings};
 use uav_relay_decode::vectors::Vectors;
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};
@@ -48,10 +49,7 @@ fn the_example_frames_follow_the_rules() {
 #[test]
 fn the_example_handshake_is_accepted_with_equal_tags() {
     let settings = Settings {
-        auth: Some(Auth {
-            key: Key::new(key()),
-            epoch: 9,
-        }),
+        auth: Some(make::auth(key(), 9)),
         ..Settings::default()
     };
     let mut relay = fixtures::relay(mission(3), 2, settings);

@@ -2,8 +2,9 @@
 
 use host_tests::bench;
 use host_tests::fixtures::{NETWORK, mission};
+use host_tests::make;
 use uav_relay::SetupError;
-use uav_relay::{Auth, Identity, Instant, Key, Port, Relay, Settings, Stats, Wiring};
+use uav_relay::{Instant, Port, Relay, Settings, Stats, Wiring};
 
 use super::frames::{Plain, SIGNED, handshake, nonce, plain};
 use super::kinds::raised;
@@ -155,16 +156,10 @@ fn a_reused_epoch_is_not_accepted_as_a_restart() {
 #[test]
 fn epoch_0_is_refused() {
     let settings = Settings {
-        auth: Some(Auth {
-            key: Key::new(KEY),
-            epoch: 0,
-        }),
+        auth: Some(make::auth(KEY, 0)),
         ..Settings::default()
     };
-    let identity = Identity {
-        network: NETWORK,
-        index: 1,
-    };
+    let identity = make::identity(1);
     let relay = Relay::new(mission(2), identity, settings, 1, Instant::ZERO);
     assert_eq!(relay.err(), Some(SetupError::Epoch));
 }

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use host_tests::bench;
 use host_tests::fixtures::{NETWORK, mission};
+use host_tests::make;
 use uav_relay::{
-    Auth, Duration, Event, Ground, Identity, Instant, Interference, Interferer, Key, MAX_FRAME,
-    Mission, MissionConfig, Port, Relay, Settings, Side, Stats, Upload, Wiring,
+    Auth, Duration, Event, Ground, Instant, Interference, MAX_FRAME, Mission, MissionConfig, Port,
+    Relay, Settings, Side, Stats, Upload, Wiring,
 };
 
 pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
@@ -17,11 +18,11 @@ const ON_THE_WAY: Duration = Duration::from_millis(10);
 /// Returns an upload of mission version `version`. Each version places the interferer elsewhere.
 pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
     let config = MissionConfig {
-        interference: Interference::Source(Interferer {
-            power_w: 80.0,
-            x_m: 900.0 - 150.0 * f32::from(version),
-            y_m: -300.0,
-        }),
+        interference: Interference::Source(make::interferer(
+            80.0,
+            900.0 - 150.0 * f32::from(version),
+            -300.0,
+        )),
         ..*base.config()
     };
     Upload::new(base, version, config).unwrap()
@@ -364,10 +365,7 @@ impl Net {
 }
 
 fn proof(epoch: u32) -> Auth {
-    Auth {
-        key: Key::new(KEY),
-        epoch,
-    }
+    make::auth(KEY, epoch)
 }
 
 /// Creates relay `index` of `of` relays. `start` is the relay's epoch and the current time.
@@ -388,10 +386,7 @@ fn started(
         auth: Some(proof(epoch)),
         ..Settings::default()
     };
-    let identity = Identity {
-        network: NETWORK,
-        index,
-    };
+    let identity = make::identity(index);
     let seed = u32::from(index) << 8 | epoch;
     let mut relay = Relay::new(mission(of), identity, settings, seed, now).unwrap();
     if let Some(upload) = stored {

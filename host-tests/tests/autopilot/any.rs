@@ -1,6 +1,7 @@
 //! Fuzz test of the link: targets are finite, near the line, and sent only in states that permit them.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use mavlink::dialects::common::MavLandedState;
 use rand::{RngExt, SeedableRng};
 
@@ -49,11 +50,9 @@ fn every_target_sent_is_finite_and_near() {
                 4 => vehicle.position_every_ms = [200, 1_000, u64::MAX][rng.random_range(0..3)],
                 5 => {
                     let [x_m, y_m, altitude_m] = [0; 3].map(|_| number(&mut rng));
-                    vehicle.setpoint = rng.random_bool(0.8).then_some(Placement {
-                        x_m,
-                        y_m,
-                        altitude_m,
-                    });
+                    vehicle.setpoint = rng
+                        .random_bool(0.8)
+                        .then_some(make::placement(x_m, y_m, altitude_m));
                 }
                 6 => vehicle.reboot(),
                 7 => {

@@ -3,10 +3,10 @@
 use uav_relay::flight::autopilot::{Autopilot, WaitReason};
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
-    Auth, Event, GuardConfig, Key, Mission, MissionConfig, Port, Relay, Settings, Side, Sites,
-    Upload,
+    Event, GuardConfig, Mission, MissionConfig, Port, Relay, Settings, Side, Sites, Upload,
 };
 
+use host_tests::make;
 use host_tests::{bench, fixtures};
 use mavlink::dialects::common::{
     COMMAND_LONG_DATA, MavCmd, MavLandedState, MavMessage, RADIO_STATUS_DATA,
@@ -311,10 +311,7 @@ fn a_drone_out_of_sequence_cannot_be_engaged() {
 /// A second mission then moves Tx back.
 #[test]
 fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
-    let auth = Some(Auth {
-        key: Key::new([7; 32]),
-        epoch: 1,
-    });
+    let auth = Some(make::auth([7; 32], 1));
     let settings = Settings {
         auth,
         ..Settings::default()

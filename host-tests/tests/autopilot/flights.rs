@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::Duration;
@@ -361,10 +362,12 @@ impl Flight {
     }
 
     fn setpoint(&mut self) {
-        let place = |rng: &mut ChaCha8Rng| Placement {
-            x_m: rng.random_range(200.0..400.0),
-            y_m: rng.random_range(-20.0..20.0),
-            altitude_m: rng.random_range(20.0..40.0),
+        let place = |rng: &mut ChaCha8Rng| {
+            make::placement(
+                rng.random_range(200.0..400.0),
+                rng.random_range(-20.0..20.0),
+                rng.random_range(20.0..40.0),
+            )
         };
         self.setpoint = self.rng.random_bool(0.8).then(|| place(&mut self.rng));
     }

@@ -5,6 +5,7 @@
 //! ArduCopter: always accepts GUIDED, keeps a velocity for 3 s after the last target, silently ignores targets outside its
 //! fence, returns at a fence breach, flies for 8 s without GPS and then lands. Both answer TIMESYNC and message requests.
 
+use host_tests::make;
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::axis::Axis;
 use uav_relay::flight::mavlink::frame::{checksum, find_known};
@@ -506,11 +507,7 @@ impl Real {
         long: impl Fn(usize) -> i32,
         float: impl Fn(usize) -> f32,
     ) {
-        let at = Geodetic {
-            lat_e7: long(4),
-            lon_e7: long(8),
-            amsl_mm: (f64::from(float(12)) * 1e3) as i32,
-        };
+        let at = make::geodetic(long(4), long(8), (f64::from(float(12)) * 1e3) as i32);
         let mask = u16::from_le_bytes([payload[48], payload[49]]);
         let place = self.axis.place(at).unwrap();
         let to = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
@@ -541,9 +538,5 @@ impl Real {
 }
 
 pub(crate) fn placement(at: Point) -> Placement {
-    Placement {
-        x_m: at[0] as f32,
-        y_m: at[1] as f32,
-        altitude_m: at[2] as f32,
-    }
+    make::placement(at[0] as f32, at[1] as f32, at[2] as f32)
 }

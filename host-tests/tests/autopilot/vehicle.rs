@@ -1,5 +1,6 @@
 //! Simulated vehicle with a PX4 or ArduCopter: it hovers, or flies to the companion's last target.
 
+use host_tests::make;
 use mavlink::dialects::common::{
     COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, MavLandedState,
     MavMessage, POSITION_TARGET_GLOBAL_INT_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
@@ -74,11 +75,7 @@ impl Target {
     }
 
     pub(crate) fn place(&self) -> Placement {
-        let point = Geodetic {
-            lat_e7: self.lat_e7,
-            lon_e7: self.lon_e7,
-            amsl_mm: (self.alt_m * 1e3) as i32,
-        };
+        let point = make::geodetic(self.lat_e7, self.lon_e7, (self.alt_m * 1e3) as i32);
         axis().place(point).unwrap()
     }
 }

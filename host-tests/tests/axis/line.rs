@@ -1,5 +1,6 @@
 //! Lines on earth: frame, ends, limits, and geodetic positions.
 
+use host_tests::make;
 use uav_relay::flight::axis::{Axis, AxisError};
 use uav_relay::{Geodetic, Placement};
 
@@ -92,11 +93,7 @@ fn nothing_far_from_the_line_or_not_finite_has_a_point() {
         (-5_001.0, 0.0, 20.0),
         (0.0, 5_001.0, 20.0),
     ] {
-        let place = Placement {
-            x_m,
-            y_m,
-            altitude_m,
-        };
+        let place = make::placement(x_m, y_m, altitude_m);
         assert_eq!(axis.point(place), None, "{place:?}");
     }
     assert_eq!(
@@ -147,11 +144,7 @@ fn a_mission_over_another_distance_is_another() {
 #[test]
 fn degrees_become_the_nearest_units() {
     let point = Geodetic::from_degrees(47.400_000_04, -8.540_000_06, 420.000_4);
-    let nearest = Geodetic {
-        lat_e7: 474_000_000,
-        lon_e7: -85_400_001,
-        amsl_mm: 420_000,
-    };
+    let nearest = make::geodetic(474_000_000, -85_400_001, 420_000);
     assert_eq!(point, Some(nearest));
 }
 

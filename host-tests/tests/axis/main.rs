@@ -4,6 +4,7 @@ mod line;
 
 use chacha20::ChaCha8Rng;
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use serde::Deserialize;
 use uav_relay::Geodetic;
@@ -29,11 +30,7 @@ struct Beside {
 }
 
 const fn ground(lat_e7: i32, lon_e7: i32) -> Geodetic {
-    Geodetic {
-        lat_e7,
-        lon_e7,
-        amsl_mm: 0,
-    }
+    make::geodetic(lat_e7, lon_e7, 0)
 }
 
 impl Beside {

@@ -54,88 +54,66 @@ const NO_QUORUM: &str = "no quorum: ";
 /// any companion, and so may a log line about relay 0; other lines come from the relay's own companion.
 type Fault = (&'static str, usize, &'static str, &'static str);
 
-const RELEASED: &str = "warning relay # released";
-const BLIND: &str = "critical relay #: the autopilot reports no position";
-const UNLINKED: &str = "critical relay #: the link to the autopilot is lost";
 const LOST: &str = "critical relay #";
 
-/// Groups of faults that happen at the same time.
+/// Groups of faults that happen at the same time: the command and the relay of each fault.
 ///
-/// Each fault states the alarm on the page and the log line that the test expects.
-const SCRIPT: [&[Fault]; 14] = [
-    &[
-        ("pilot", 3, RELEASED, "released: "),
-        ("gps", 6, BLIND, "no recent position"),
-        ("mute", 8, UNLINKED, "no heartbeat"),
-        ("unplug", 1, UNLINKED, "no heartbeat"),
-    ],
-    &[
-        ("kill", 4, LOST, "relay # toward"),
-        ("reboot", 7, RELEASED, "rebooted"),
-        ("rtl", 2, RELEASED, "released: "),
-    ],
-    &[
-        ("cut", 2, LOST, "relay # toward"),
-        ("gps", 5, BLIND, "no recent position"),
-        ("pilot", 8, RELEASED, "released: "),
-    ],
-    &[
-        // Alone, because a fault of another relay is a reason to wait.
-        (
-            "refuse",
-            5,
+/// The fault "refuse" is alone, because a fault of another relay is a reason to wait.
+const SCRIPT: [&str; 14] = [
+    "pilot 3, gps 6, mute 8, unplug 1",
+    "kill 4, reboot 7, rtl 2",
+    "cut 2, gps 5, pilot 8",
+    "refuse 5",
+    "pilot 1, mute 8, pilot 2, pilot 4, pilot 6",
+    "pilot 5, pilot 7, hold 1",
+    "gps 1, gps 8, rtl 3",
+    "cut off 0",
+    "kill 1, kill 8",
+    "stop 5",
+    "epoch 6",
+    "key 3",
+    "mission 7",
+    "no quorum 0",
+];
+
+/// Returns the fault of an entry in [`SCRIPT`], with its alarm on the page and its log line.
+fn fault(entry: &'static str) -> Fault {
+    const RELEASED: &str = "warning relay # released";
+    let (what, relay) = entry.rsplit_once(' ').unwrap();
+    let (alarm, line) = match what {
+        "pilot" | "rtl" | "hold" => (RELEASED, "released: "),
+        "reboot" => (RELEASED, "rebooted"),
+        "gps" => (
+            "critical relay #: the autopilot reports no position",
+            "no recent position",
+        ),
+        "mute" | "unplug" => (
+            "critical relay #: the link to the autopilot is lost",
+            "no heartbeat",
+        ),
+        "kill" | "cut" | "stop" => (LOST, "relay # toward"),
+        "refuse" => (
             "warning relay # does not fly to its setpoint",
             "flies to a target other than the setpoint",
         ),
-    ],
-    &[
-        ("pilot", 1, RELEASED, "released: "),
-        ("mute", 8, UNLINKED, "no heartbeat"),
-        ("pilot", 2, RELEASED, "released: "),
-        ("pilot", 4, RELEASED, "released: "),
-        ("pilot", 6, RELEASED, "released: "),
-    ],
-    &[
-        ("pilot", 5, RELEASED, "released: "),
-        ("pilot", 7, RELEASED, "released: "),
-        ("hold", 1, RELEASED, "released: "),
-    ],
-    &[
-        ("gps", 1, BLIND, "no recent position"),
-        ("gps", 8, BLIND, "no recent position"),
-        ("rtl", 3, RELEASED, "released: "),
-    ],
-    &[(
-        "cut off",
-        0,
-        "critical nothing received from the chain",
-        "does not reply",
-    )],
-    &[
-        ("kill", 1, LOST, "relay # toward"),
-        ("kill", 8, LOST, "relay # toward"),
-    ],
-    &[("stop", 5, LOST, "relay # toward")],
-    &[(
-        "epoch",
-        6,
-        "critical relay # started with an old epoch",
-        "relay # has started with an epoch",
-    )],
-    &[(
-        "key",
-        3,
-        "critical relay # signs with another key",
-        "relay # signs with another key",
-    )],
-    &[(
-        "mission",
-        7,
-        "warning relay # has another mission",
-        "relay # has another mission",
-    )],
-    &[("no quorum", 0, "critical no quorum", "no quorum: ")],
-];
+        "cut off" => ("critical nothing received from the chain", "does not reply"),
+        "epoch" => (
+            "critical relay # started with an old epoch",
+            "relay # has started with an epoch",
+        ),
+        "key" => (
+            "critical relay # signs with another key",
+            "relay # signs with another key",
+        ),
+        "mission" => (
+            "warning relay # has another mission",
+            "relay # has another mission",
+        ),
+        "no quorum" => ("critical no quorum", "no quorum: "),
+        _ => panic!("{entry}"),
+    };
+    (what, relay.parse().unwrap(), alarm, line)
+}
 
 /// Prints the times, s, from each fault until a companion notices it and until its alarm.
 ///
@@ -302,10 +280,10 @@ impl Stage {
             {
                 continue;
             }
-            let group = &group[..group.len().min(left)];
+            let group: Vec<Fault> = group.split(", ").take(left).map(fault).collect();
             left -= group.len();
             if !group.is_empty() {
-                self.group(group, &mut failures);
+                self.group(&group, &mut failures);
             }
         }
         assert!(failures.is_empty(), "{failures:#?}");

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use uav_relay::Placement;
+use host_tests::make;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
 
@@ -29,11 +29,7 @@ fn a_relay_locates_the_interferer_by_samples_from_a_fifo() {
         [700.0, -30.0, 20.0],
         [900.0, 40.0, 50.0],
     ] {
-        let at = Placement {
-            x_m,
-            y_m,
-            altitude_m,
-        };
+        let at = make::placement(x_m, y_m, altitude_m);
         let power_w = scene.interference_w(at);
         writeln!(lines, "{x_m} {y_m} {altitude_m} {power_w:e}").unwrap();
     }

@@ -81,6 +81,10 @@ fn a_bad_key_or_epoch_is_named() {
     files.write("text", "yesterday");
     files.write("last", "4294967295");
     let text = |name: &str| files.text(name);
+    let no_number = "text: must contain one number within 0 to 4294967294: the epoch (start counter) of the last start";
+    let largest = "last: the epoch (start counter) in the file is the largest one, and every start needs a larger epoch: give all relays a new key, and delete this file";
+    let proc = "/proc/self/epoch".to_owned();
+    let unwritten = "--epoch-file /proc/self/epoch: cannot be written";
     for (key, epoch, status, words) in [
         (
             "short",
@@ -89,25 +93,10 @@ fn a_bad_key_or_epoch_is_named() {
             "short: must be 64 hexadecimal digits",
         ),
         ("nowhere", text("epoch"), 2, "nowhere: cannot be read"),
-        (
-            "key",
-            text("text"),
-            1,
-            "text: must contain one number within 0 to 4294967294: the epoch (start counter) of the last start",
-        ),
-        (
-            "key",
-            text("last"),
-            1,
-            "last: the epoch (start counter) in the file is the largest one, and every start needs a larger epoch: give all relays a new key, and delete this file",
-        ),
+        ("key", text("text"), 1, no_number),
+        ("key", text("last"), 1, largest),
         ("key", text("no/folder"), 1, "folder: cannot be written"),
-        (
-            "key",
-            "/proc/self/epoch".to_owned(),
-            1,
-            "--epoch-file /proc/self/epoch: cannot be written",
-        ),
+        ("key", proc, 1, unwritten),
     ] {
         let key = files.text(key);
         let options = format!("--index 1 --of 1 --key-file {key} --epoch-file {epoch}");

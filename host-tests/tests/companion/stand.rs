@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
 
+use host_tests::make;
 use rustix::process::Signal;
 use serde_json::Value;
-use uav_relay::Placement;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
 
@@ -49,11 +49,11 @@ fn is_about(said: &Value, expected: f64) -> bool {
 fn fifo_lines(scene: &Scene, relay: usize) -> String {
     let mut lines = String::new();
     for step in 0..3_u8 {
-        let at = Placement {
-            x_m: 300.0 * relay as f32 - 250.0 + 80.0 * f32::from(step),
-            y_m: 40.0 - 40.0 * f32::from(step),
-            altitude_m: 20.0 + 10.0 * f32::from(step),
-        };
+        let at = make::placement(
+            300.0 * relay as f32 - 250.0 + 80.0 * f32::from(step),
+            40.0 - 40.0 * f32::from(step),
+            20.0 + 10.0 * f32::from(step),
+        );
         let power_w = scene.interference_w(at);
         writeln!(lines, "{} {} {} {power_w:e}", at.x_m, at.y_m, at.altitude_m).unwrap();
     }

@@ -215,32 +215,15 @@ fn a_useless_upload_file_is_named_and_ignored() {
         altitude_max_m: 21.0,
         ..Scenario::default()
     };
+    let useless = "the file is damaged, or not an uploaded mission; the relay ignores the file and starts with the mission of its options";
+    let of_others =
+        "the uploaded mission in this file is for relays with a loaded mission of digest 0x";
     for (bytes, words) in [
         (good.clone(), None),
-        (
-            damaged,
-            Some(
-                "the file is damaged, or not an uploaded mission; the relay ignores the file and starts with the mission of its options",
-            ),
-        ),
-        (
-            good[..Upload::LENGTH].to_vec(),
-            Some(
-                "the file is damaged, or not an uploaded mission; the relay ignores the file and starts with the mission of its options",
-            ),
-        ),
-        (
-            Vec::new(),
-            Some(
-                "the file is damaged, or not an uploaded mission; the relay ignores the file and starts with the mission of its options",
-            ),
-        ),
-        (
-            stored(&high, &new()),
-            Some(
-                "the uploaded mission in this file is for relays with a loaded mission of digest 0x",
-            ),
-        ),
+        (damaged, Some(useless)),
+        (good[..Upload::LENGTH].to_vec(), Some(useless)),
+        (Vec::new(), Some(useless)),
+        (stored(&high, &new()), Some(of_others)),
     ] {
         std::fs::write(&file, &bytes).unwrap();
         let options = format!("--index 1 --of 1 {signed} --upload-file {file}");

@@ -1,10 +1,11 @@
 //! Checks of the f64 reference for chains in stochastic interference by independent values and methods.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::{log_uniform, seed};
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Relay};
 
 use super::off;
 
@@ -35,10 +36,7 @@ fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Relay {
-            altitude_m: 10.0,
-            power_w: 1.0,
-        }],
+        relays: vec![make::reference_relay(10.0, 1.0)],
     }
 }
 
@@ -118,10 +116,10 @@ fn the_first_feasible_target_is_not_the_optimum() {
 /// Draws a chain of identical relays with the same interference everywhere on the line.
 fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
     let distance_m = log_uniform(rng, 10.0, 1e5);
-    let station = Relay {
-        altitude_m: (log_uniform(rng, 0.002, 0.2) * distance_m).clamp(1.0, 5000.0),
-        power_w: log_uniform(rng, 0.01, 100.0),
-    };
+    let station = make::reference_relay(
+        (log_uniform(rng, 0.002, 0.2) * distance_m).clamp(1.0, 5000.0),
+        log_uniform(rng, 0.01, 100.0),
+    );
     let mu_los = log_uniform(rng, 1.0, 1e4);
     StochasticLink {
         distance_m,
@@ -213,14 +211,8 @@ fn the_expected_sir_is_power_over_distance_and_upsilon() {
         eta: 4.0,
         upsilon: vec![(0.0, 1.0), (100.0, 11.0)],
         relays: vec![
-            Relay {
-                altitude_m: 3.0,
-                power_w: 10.0,
-            },
-            Relay {
-                altitude_m: 6.0,
-                power_w: 13.0,
-            },
+            make::reference_relay(3.0, 10.0),
+            make::reference_relay(6.0, 13.0),
         ],
     };
     assert_eq!(link.upsilon_at(-5.0), 1.0);

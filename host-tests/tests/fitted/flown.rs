@@ -1,9 +1,8 @@
 //! Chains that agree on fitted slots by messages, and carry data in them.
 
-use uav_relay::{
-    Identity, Instant, Method, Mission, Placement, Relay, Settings, SetupError, SlotShares,
-};
-use uav_relay_scenario::{RelayOverride, mission};
+use host_tests::make;
+use uav_relay::{Instant, Method, Mission, Placement, Relay, Settings, SetupError, SlotShares};
+use uav_relay_scenario::mission;
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::route::{DataLink, TrueHops};
@@ -15,10 +14,7 @@ use super::scenes::{Case, TOLERANCE, number};
 
 /// Creates relay 1 of `mission`.
 pub(crate) fn relay(mission: &Mission, settings: Settings) -> Result<Relay, SetupError> {
-    let identity = Identity {
-        network: 7,
-        index: 1,
-    };
+    let identity = make::identity(1);
     Relay::new(*mission, identity, settings, 1, Instant::ZERO)
 }
 
@@ -168,10 +164,7 @@ fn the_first_agreement_is_for_the_common_power() {
         let mut case = case.clone();
         case.scenario.relays.clear();
         if let Some(index) = other {
-            let own = RelayOverride {
-                altitude_m: None,
-                power_w: Some(3.0),
-            };
+            let own = make::relay_override(None, Some(3.0));
             case.scenario.relays.insert(index, own);
         }
         let mission = case.mission();

@@ -7,6 +7,7 @@ mod scenes;
 mod several;
 
 use core::task::Poll;
+use host_tests::make;
 
 use uav_relay::optimiser::joint::{Seat, Solver};
 
@@ -102,17 +103,11 @@ fn free_places_carry_no_less() {
         let case = Case::draw(seed);
         let line = case.mission();
         let config = MissionConfig {
-            band: Band {
-                least_m: 20.0,
-                most_m: 300.0,
-            },
+            band: make::band(20.0, 300.0),
             lateral: if seed % 2 == 0 {
                 Band::NONE
             } else {
-                Band {
-                    least_m: -300.0,
-                    most_m: 300.0,
-                }
+                make::band(-300.0, 300.0)
             },
             ..*line.config()
         };

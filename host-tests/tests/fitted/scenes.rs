@@ -1,12 +1,13 @@
 //! Random chains with fitted slots.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::optimiser::joint::Seat;
 use uav_relay::{Mission, Placement};
 use uav_relay_scenario::link::{Access, Link, Radio, RateModel};
 use uav_relay_scenario::scene::{Place, Scene};
-use uav_relay_scenario::{Interference, Noise, RelayOverride, Scenario, Source, mission};
+use uav_relay_scenario::{Interference, Noise, Scenario, Source, mission};
 
 /// Relative tolerance of the SIR of all missions.
 pub(crate) const TOLERANCE: f64 = 1e-4;
@@ -67,10 +68,7 @@ impl Case {
             };
         }
         if rng.random_bool(0.3) {
-            let own = RelayOverride {
-                altitude_m: None,
-                power_w: Some(rng.random_range(0.2..3.0)),
-            };
+            let own = make::relay_override(None, Some(rng.random_range(0.2..3.0)));
             scenario.relays.insert(rng.random_range(1..=relays), own);
         }
         Self {

@@ -2,12 +2,13 @@
 //!
 //! Relays replace the interferers by a hypothetical one.
 
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::Placement;
 use uav_relay_scenario::link::Access;
-use uav_relay_scenario::{Interference, PlannedMethod, Source};
+use uav_relay_scenario::{Interference, PlannedMethod};
 use uav_relay_tools::plan::flown::flown;
-use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
+use uav_relay_tools::plan::{Plan, PlanRequest, plan};
 
 use super::check_limits;
 use super::scenes::{Case, TOLERANCE, number};
@@ -22,10 +23,12 @@ fn draw(seed: u64) -> Case {
     if seed.is_multiple_of(3) {
         (case.scenario.lateral_min_m, case.scenario.lateral_max_m) = (-200.0, 200.0);
     }
-    let sources = (0..rng.random_range(2..=4)).map(|_| Source {
-        power_w: 10_f64.powf(rng.random_range(0.0..2.0)),
-        x_m: rng.random_range(-200.0..1200.0),
-        y_m: rng.random_range(20.0..800.0),
+    let sources = (0..rng.random_range(2..=4)).map(|_| {
+        make::source(
+            10_f64.powf(rng.random_range(0.0..2.0)),
+            rng.random_range(-200.0..1200.0),
+            rng.random_range(20.0..800.0),
+        )
     });
     case.scenario.interference = Interference::Sources(sources.collect());
     case
@@ -42,12 +45,7 @@ fn plans_against_several_interferers_are_compared_by_their_rates() {
     for seed in first..first + all {
         let case = draw(seed);
         let what = format!("SEED={seed}: {case:?}");
-        let ask = PlanRequest {
-            number: Number::Of(case.relays),
-            free_altitude: true,
-            x_m: None,
-            tolerance: TOLERANCE,
-        };
+        let ask = PlanRequest::of(case.relays, true, TOLERANCE);
         let places = |plan: &Plan| {
             plan.places
                 .iter()

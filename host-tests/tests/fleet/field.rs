@@ -1,11 +1,11 @@
 //! Numbers of relays that meet a target, and best targets, in a field of interference.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{Rng, RngExt, SeedableRng};
 use uav_relay::{Mission, MissionConfig, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, count, log_uniform};
-use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_tools::fewest::{self, Fewest};
 
@@ -18,10 +18,7 @@ pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink 
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Relay {
-            altitude_m: h,
-            power_w: 1.0,
-        }],
+        relays: vec![make::reference_relay(h, 1.0)],
     }
 }
 

@@ -1,11 +1,12 @@
 //! Numbers of relays with one interferer.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use host_tests::placing::profile_of;
 use rand::{Rng, RngExt, SeedableRng};
 use uav_relay::{Mission, Profile};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
-use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
+use uav_relay_oracle::random::{self, Chain, count, log_uniform};
 use uav_relay_oracle::reference::Link;
 use uav_relay_tools::fewest::{Fewest, Most};
 
@@ -76,10 +77,7 @@ fn the_fewest_are_those_of_an_exhaustive_search() {
         } else {
             Chain::Alike
         };
-        let style = Style {
-            relays: 1..=20,
-            chain: kind,
-        };
+        let style = make::style(1..=20, kind);
         let link = as_relays_know_it(&random::link(&mut rng, &style));
         let Some(target) = target(&mut rng, &link) else {
             continue;
@@ -135,10 +133,7 @@ fn with_a_separation_a_proven_number_is_the_fewest() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(602));
     let (mut proven, mut not, mut none) = (0, 0, 0);
     for _ in 0..count(10_000) / 5 {
-        let style = Style {
-            relays: 1..=1,
-            chain: Chain::Alike,
-        };
+        let style = make::style(1..=1, Chain::Alike);
         let mut link = random::link(&mut rng, &style);
         link.min_separation_m = link.distance_m * log_uniform(&mut rng, 1e-3, 0.3);
         let link = as_relays_know_it(&link);
@@ -181,10 +176,7 @@ fn no_number_of_relays_exceeds_the_reported_maximum() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(603));
     let (mut met, mut exceeded) = (0, 0);
     for _ in 0..300 {
-        let style = Style {
-            relays: 1..=1,
-            chain: Chain::Alike,
-        };
+        let style = make::style(1..=1, Chain::Alike);
         let mut link = random::link(&mut rng, &style);
         // A separation limits the number of relays and the work.
         link.min_separation_m = if rng.random_bool(0.5) {

@@ -1,9 +1,10 @@
 //! Values of an independent program, and errors of the printed rules.
 
+use host_tests::make;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::of_stochastic_link;
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_tools::fewest::Fewest;
 
 use super::chain;
@@ -39,10 +40,7 @@ fn the_reference_cases_hold() {
             mu_los: params.mu_los,
             eta: params.eta,
             upsilon: vec![(0.0, case.arg("upsilon").unwrap())],
-            relays: vec![Relay {
-                altitude_m: params.h,
-                power_w: params.p_u,
-            }],
+            relays: vec![make::reference_relay(params.h, params.p_u)],
         };
         let mission = of_stochastic_link(&link, 0.0).unwrap();
         let common = mission.config().common;

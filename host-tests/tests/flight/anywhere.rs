@@ -14,10 +14,11 @@
 //! Two engaged drones never come nearer than the separation, or their distance when they were engaged, less twice the stated
 //! error.
 
+use host_tests::make;
 use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::flight::axis::Axis;
-use uav_relay::{Duration, MissionConfig, Placement, Side, Sites, Upload};
+use uav_relay::{Duration, MissionConfig, Side, Sites, Upload};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::drones::Point;
 use uav_relay_sim::simulator::fleet::{FleetSpec, Takeover, somewhere};
@@ -71,12 +72,8 @@ fn turned(rng: &mut ChaCha8Rng, setup: &Setup, axis: &Axis) -> UploadSpec {
     let angle = rng.random_range(-80.0_f64..=80.0).to_radians();
     let length_m = f64::from(config.distance_m) * rng.random_range(0.5..=1.3);
     let at = |x_m: f64, y_m: f64| {
-        axis.point(Placement {
-            x_m: x_m as f32,
-            y_m: y_m as f32,
-            altitude_m: 0.0,
-        })
-        .unwrap()
+        axis.point(make::placement(x_m as f32, y_m as f32, 0.0))
+            .unwrap()
     };
     let sites = Sites {
         tx: at(0.0, 0.0),

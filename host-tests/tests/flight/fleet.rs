@@ -1,8 +1,9 @@
 //! Eight drones with autopilots, pilots and all kinds of faults.
 
+use host_tests::make;
 use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
-use uav_relay::{Interference, Interferer, MissionConfig, Side, Upload};
+use uav_relay::{Interference, MissionConfig, Side, Upload};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::fleet::{FleetSpec, Takeover, somewhere};
 use uav_relay_sim::simulator::outcome::Ending;
@@ -89,11 +90,11 @@ fn flight(seed: u64) -> Setup {
     if rng.random_bool(0.4) {
         setup.auth = true;
         let to = MissionConfig {
-            interference: Interference::Source(Interferer {
-                power_w: 80.0,
-                x_m: rng.random_range(-100.0..1_100.0),
-                y_m: rng.random_range(50.0..500.0),
-            }),
+            interference: Interference::Source(make::interferer(
+                80.0,
+                rng.random_range(-100.0..1_100.0),
+                rng.random_range(50.0..500.0),
+            )),
             ..*config
         };
         setup.uploads = vec![UploadSpec {

@@ -1,9 +1,10 @@
 //! Eight drones in flight whose receiver moves, by an upload with new sites.
 
+use host_tests::make;
 use rand::SeedableRng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::flight::axis::Axis;
-use uav_relay::{Duration, MissionConfig, Placement, Side, Sites, Upload};
+use uav_relay::{Duration, MissionConfig, Side, Sites, Upload};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::fleet::{FleetSpec, somewhere};
 use uav_relay_sim::simulator::outcome::Ending;
@@ -41,11 +42,7 @@ fn flight(seed: u64) -> Setup {
     setup.faults.loss = rng.random_range(0.0..=0.4);
     let axis = somewhere(f64::from(config.distance_m)).unwrap();
     let at = |x_m, y_m| {
-        let place = Placement {
-            x_m,
-            y_m,
-            altitude_m: 0.0,
-        };
+        let place = make::placement(x_m, y_m, 0.0);
         axis.point(place).unwrap()
     };
     // Uploads come on the way, after arrival, or in quick succession.

@@ -1,9 +1,9 @@
 //! Test chain with the paper's link, in virtual time. Its relays can reboot.
 
 use host_tests::bench::{Bench, Frame};
-use host_tests::fixtures::NETWORK;
+use host_tests::make;
 use uav_relay::wire::message::{AdjustStep, Message};
-use uav_relay::{Band, Duration, Identity, Instant, Mission, MissionConfig, Relay, Settings};
+use uav_relay::{Band, Duration, Instant, Mission, MissionConfig, Relay, Settings};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Place};
@@ -47,10 +47,7 @@ impl Chain {
     }
 
     pub(crate) fn reboot(&mut self, at: usize, seed: u32) {
-        let identity = Identity {
-            network: NETWORK,
-            index: u16::try_from(at).unwrap() + 1,
-        };
+        let identity = make::identity(u16::try_from(at).unwrap() + 1);
         let now = self.bench.now;
         let relay = Relay::new(self.mission, identity, self.settings, seed, now);
         self.bench.relays[at] = relay.unwrap();
@@ -97,7 +94,4 @@ impl Chain {
 /// Altitude range that permits only 20 m.
 pub(crate) const LOW: Band = Band::at(20.0);
 /// Altitude range from 20 m to 300 m.
-pub(crate) const WIDE: Band = Band {
-    least_m: 20.0,
-    most_m: 300.0,
-};
+pub(crate) const WIDE: Band = make::band(20.0, 300.0);

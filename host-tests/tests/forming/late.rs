@@ -1,7 +1,8 @@
 //! Late frames from before a reboot, or of an earlier view.
 
+use host_tests::make;
 use uav_relay::wire::message::Message;
-use uav_relay::{Adjust, Local, Method, Settings};
+use uav_relay::{Local, Method, Settings};
 
 use crate::hand::{Chain, LOW, WIDE, is_stop};
 use host_tests::bench::Bench;
@@ -12,11 +13,7 @@ use host_tests::bench::Bench;
 /// which the relays reach by Algorithm 2. No relay may act on the message.
 #[test]
 fn a_sweep_from_before_a_reboot_does_not_spoil_an_agreement() {
-    let method = Method::Adjust(Adjust {
-        rounds: 50,
-        explore_m: 30.0,
-        local: Local::Fine,
-    });
+    let method = Method::Adjust(make::adjust(50, 30.0, Local::Fine));
     let settings = Settings {
         method,
         ..Settings::default()

@@ -13,6 +13,7 @@
 //! | uploads | the line turns by up to 85 degrees once in 50 % of the flights, received by each relay up to 5 s late |
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use uav_relay::flight::autopilot::carrot::Pace;
@@ -61,11 +62,7 @@ impl Line {
 }
 
 fn placement([x, y, h]: Point) -> Placement {
-    Placement {
-        x_m: x as f32,
-        y_m: y as f32,
-        altitude_m: h as f32,
-    }
+    make::placement(x as f32, y as f32, h as f32)
 }
 
 fn point(place: Placement) -> Point {

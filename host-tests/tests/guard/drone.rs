@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::RngExt;
 use uav_relay::GuardConfig;
 use uav_relay::guard::Guard;
@@ -273,9 +274,5 @@ pub(crate) fn node(k: usize) -> u16 {
 
 pub(crate) fn place(at: Point) -> Placement {
     let [x_m, y_m, altitude_m] = at.map(|part| part as f32);
-    Placement {
-        x_m,
-        y_m,
-        altitude_m,
-    }
+    make::placement(x_m, y_m, altitude_m)
 }

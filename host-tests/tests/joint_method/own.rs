@@ -4,6 +4,7 @@ use std::task::Poll;
 
 use chacha20::ChaCha8Rng;
 use host_tests::flights::unharmed;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::{Adjust, Method, Mission, MissionConfig, Profile};
@@ -39,18 +40,12 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     };
     let mut setup = setup(&alike, drawn.corridor)?;
     let config = MissionConfig {
-        common: Profile {
-            altitude_m: drawn.corridor.least_m as f32,
-            power_w: first as f32,
-        },
+        common: make::profile(drawn.corridor.least_m as f32, first as f32),
         ..*setup.mission.config()
     };
     setup.mission = Mission::try_new(config).ok()?;
     for (relay, index) in drawn.link.relays.iter().zip(1..) {
-        let own = Profile {
-            altitude_m: relay.altitude_m as f32,
-            power_w: relay.power_w as f32,
-        };
+        let own = make::profile(relay.altitude_m as f32, relay.power_w as f32);
         if own != config.common {
             setup.profiles.push((index, own));
         }
@@ -122,10 +117,7 @@ fn different_relays_come_near_the_joint_optimum() {
 fn one_relay_may_have_a_fixed_altitude() {
     let (link, corridor) = close_by(6);
     let mut setup = setup(&link, corridor).unwrap();
-    let own = Profile {
-        altitude_m: 77.7,
-        power_w: 1.0,
-    };
+    let own = make::profile(77.7, 1.0);
     setup.profiles.push((3, own));
     setup.held.push(3);
     let outcome = settle(setup);
@@ -160,10 +152,7 @@ fn different_relays_take_three_round_trips_or_more() {
         let (link, corridor) = roomy(relays, 500.0, 150.0, 280.0, 300.0);
         let mut setup = setup(&link, corridor).unwrap();
         for &index in own {
-            let own = Profile {
-                altitude_m: 80.0,
-                power_w: 1.25,
-            };
+            let own = make::profile(80.0, 1.25);
             setup.profiles.push((index, own));
             if index % 4 < 2 {
                 setup.held.push(index);
@@ -186,10 +175,7 @@ fn powers_unknown_to_the_leader_are_collected() {
     let (link, corridor) = close_by(8);
     let mut setup = setup(&link, corridor).unwrap();
     for (index, power_w) in [(2, 0.4), (5, 2.5), (7, 0.7)] {
-        let own = Profile {
-            altitude_m: 20.0,
-            power_w,
-        };
+        let own = make::profile(20.0, power_w);
         setup.profiles.push((index, own));
     }
     let mut real = link.clone();

@@ -7,18 +7,13 @@ use serde_json::{Value, json};
 use uav_relay::Placement;
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
-use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
+use uav_relay_tools::plan::{Plan, PlanRequest, plan};
 
 /// Largest permitted error of a position in the map files, m.
 const ALLOWED_M: f64 = 0.01;
 
 fn best(scenario: &Scenario, relays: u16) -> Plan {
-    let ask = PlanRequest {
-        number: Number::Of(relays),
-        free_altitude: scenario.lateral_max_m > 0.0,
-        x_m: None,
-        tolerance: 1e-4,
-    };
+    let ask = PlanRequest::of(relays, scenario.lateral_max_m > 0.0, 1e-4);
     plan(scenario, &ask).unwrap()
 }
 

@@ -1,8 +1,8 @@
 //! Companion's messages, read by another codec. The vehicles of `--test autopilot` read them by a third one.
 
+use host_tests::make;
 use host_tests::python;
 use serde_json::Value;
-use uav_relay::Geodetic;
 use uav_relay::flight::mavlink::outgoing::{Outgoing, severity};
 
 use super::*;
@@ -28,11 +28,11 @@ fn messages() -> Vec<Outgoing<'static>> {
         });
         all.push(Outgoing::SetPosition {
             boot_ms: rng.random(),
-            at: Geodetic {
-                lat_e7: rng.random_range(-900_000_000..=900_000_000),
-                lon_e7: rng.random_range(-1_800_000_000..=1_800_000_000),
-                amsl_mm: rng.random_range(-500_000..9_000_000),
-            },
+            at: make::geodetic(
+                rng.random_range(-900_000_000..=900_000_000),
+                rng.random_range(-1_800_000_000..=1_800_000_000),
+                rng.random_range(-500_000..9_000_000),
+            ),
             velocity_m_s: rng
                 .random_bool(0.5)
                 .then(|| [0; 3].map(|_| rng.random_range(-20.0..20.0))),

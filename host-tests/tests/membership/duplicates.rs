@@ -5,9 +5,10 @@ use std::rc::Rc;
 
 use chacha20::ChaCha8Rng;
 use host_tests::bench::{Bench, between_neighbours};
+use host_tests::make;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
-use uav_relay::{Auth, Event, Identity, Key, Port, Relay, Settings, Wiring};
+use uav_relay::{Event, Identity, Port, Relay, Settings, Wiring};
 
 use super::*;
 
@@ -104,10 +105,7 @@ fn flown(case: Case) -> Durations {
     };
     let settings = Settings {
         wiring,
-        auth: case.signed.then(|| Auth {
-            key: Key::new([7; 32]),
-            epoch: 5,
-        }),
+        auth: case.signed.then(|| make::auth([7; 32], 5)),
         ..Settings::default()
     };
     let later = if case.at_once {
@@ -305,10 +303,7 @@ impl Meeting {
             let identity = Identity { network: 7, index };
             let settings = Settings {
                 wiring: Wiring::Shared,
-                auth: Some(Auth {
-                    key: Key::new([7; 32]),
-                    epoch,
-                }),
+                auth: Some(make::auth([7; 32], epoch)),
                 ..Settings::default()
             };
             Relay::new(mission, identity, settings, rng.random(), Instant::ZERO).unwrap()

@@ -1,6 +1,7 @@
 //! Loss and return of relays on a good channel.
 
-use uav_relay::{Adjust, Band, Local, Method, MissionConfig};
+use host_tests::make;
+use uav_relay::{Local, Method, MissionConfig};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
@@ -165,19 +166,12 @@ fn a_chain_in_a_field_recovers_from_the_other_end() {
 
 #[test]
 fn a_chain_with_free_altitudes_or_turns_recovers() {
-    let band = Band {
-        least_m: 20.0,
-        most_m: 300.0,
-    };
+    let band = make::band(20.0, 300.0);
     let config = MissionConfig {
         band,
         ..*mission(5).config()
     };
-    let adjust = Adjust {
-        rounds: 20,
-        explore_m: 30.0,
-        local: Local::Fine,
-    };
+    let adjust = make::adjust(20, 30.0, Local::Fine);
     for method in [Method::Joint, Method::Adjust(adjust)] {
         for index in 1..=5 {
             let mut setup = Setup::on_shared_channel(Mission::try_new(config).unwrap());

@@ -1,19 +1,19 @@
 //! Missions of the model test. 2 to 6 relays, every method, drawn like those of the random placement tests.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::{
     Adjust, Identity, Instant, Local, Measure, Method, Mission, MissionConfig, Profile, Relay,
     Settings,
 };
-use uav_relay::{Auth, Key};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::joint::scenario as joint_scenario;
 use uav_relay_oracle::random::{Chain, Style, link as random_link, log_uniform};
 use uav_relay_oracle::recorded::optimum;
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{self, Link};
 
 use super::chain::World;
 use super::reference::Reference;
@@ -99,10 +99,7 @@ impl Scenario {
     /// Returns the same mission with signed frames. Checks that its agreement equals that with unsigned frames.
     fn signed(mut self) -> Self {
         for one in &mut self.settings {
-            one.auth = Some(Auth {
-                key: Key::new([7; 32]),
-                epoch: 1,
-            });
+            one.auth = Some(make::auth([7; 32], 1));
         }
         let calm = World::new(&self, 1).unwrap().calm().unwrap();
         assert_eq!(calm.places, self.calm.places);
@@ -203,10 +200,7 @@ fn numbered(number: u64) -> (Link, Corridor) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     rng.set_stream(number);
     let drawn = joint_scenario(&mut rng, &(2..=6), TIGHT);
-    let narrow = uav_relay::Band {
-        least_m: drawn.corridor.least_m as f32,
-        most_m: drawn.corridor.most_m as f32,
-    };
+    let narrow = make::band(drawn.corridor.least_m as f32, drawn.corridor.most_m as f32);
     let corridor = Corridor::plane(f64::from(narrow.least_m), f64::from(narrow.most_m));
     let mut link = drawn.link;
     // All relays start at one altitude, except single ones.
@@ -229,10 +223,7 @@ fn numbered(number: u64) -> (Link, Corridor) {
 
 fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     let (link, corridor) = numbered(rng.random_range(0..SCENES));
-    let narrow = uav_relay::Band {
-        least_m: corridor.least_m as f32,
-        most_m: corridor.most_m as f32,
-    };
+    let narrow = make::band(corridor.least_m as f32, corridor.most_m as f32);
     let (mission, own) = of_link(&link, 1e-4)?;
     let config = MissionConfig {
         band: narrow,
@@ -283,10 +274,10 @@ fn in_a_field(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     let relays = rng.random_range(2..=6_u8);
     let points = rng.random_range(1..=4_u8);
     let distance_m = round(log_uniform(rng, 100.0, 1e4));
-    let relay = reference::Relay {
-        altitude_m: round(distance_m * log_uniform(rng, 0.005, 0.1)),
-        power_w: round(log_uniform(rng, 0.1, 10.0)),
-    };
+    let relay = make::reference_relay(
+        round(distance_m * log_uniform(rng, 0.005, 0.1)),
+        round(log_uniform(rng, 0.1, 10.0)),
+    );
     let mu_los = log_uniform(rng, 1.0, 1e4);
     // This unit of Upsilon makes the SIRs about 1.
     let unit = mu_los * (distance_m / f64::from(relays)).powi(2) / relay.power_w;

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::SeedableRng;
 use uav_relay_oracle::cases::{self, Case};
 use uav_relay_oracle::random::seed;
@@ -185,11 +186,7 @@ fn extreme_scenes_have_a_finite_fit() {
 /// permitted here. If no lateral offsets were permitted, the y of the fitted interferer would always be positive.
 #[test]
 fn with_lateral_range_the_fit_is_on_the_right_side() {
-    let source = |x_m: f64, y_m: f64| Source {
-        power_w: 50.0,
-        x_m,
-        y_m,
-    };
+    let source = |x_m: f64, y_m: f64| make::source(50.0, x_m, y_m);
     for side in [-1.0, 1.0] {
         let scenario = Scenario {
             lateral_min_m: -200.0,

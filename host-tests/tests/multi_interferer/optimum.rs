@@ -3,8 +3,9 @@
 use std::time::Instant;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::SeedableRng;
-use uav_relay_oracle::random::{self, Chain, Style, seed};
+use uav_relay_oracle::random::{self, Chain, seed};
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::scene::Corridor;
 use uav_relay_scenario::scene::Scene;
@@ -38,13 +39,7 @@ fn for_one_source_the_optimum_is_that_of_the_reference() {
     let (mut worst, mut hopeless) = (0.0_f64, 0);
     for at in 0..600 {
         let chain = [Chain::Alike, Chain::OwnPower][at % 2];
-        let link = random::link(
-            &mut rng,
-            &Style {
-                relays: 1..=50,
-                chain,
-            },
-        );
+        let link = random::link(&mut rng, &make::style(1..=50, chain));
         let scene = of_link(&link);
         match (optimum(&scene), link.optimum()) {
             (Some(ours), Some(theirs)) => {

@@ -20,12 +20,13 @@
 use std::ops::RangeInclusive;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::RngExt;
 use uav_relay_oracle::mission::scene_of;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::scene::Scene;
-use uav_relay_scenario::{AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source};
+use uav_relay_scenario::{AirGround, ChannelSpec, Interference, Scenario, Source};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sources {
@@ -54,10 +55,7 @@ pub(crate) fn scenario(
     let sources = (0..count).map(|_| source(rng, d, uav_w, kind)).collect();
     let own_power = rng.random_range(0..3) == 0;
     let relays = (1..=n).filter(|_| own_power).map(|index| {
-        let own = RelayOverride {
-            altitude_m: None,
-            power_w: Some(uav_w * log_uniform(rng, 0.3, 3.0)),
-        };
+        let own = make::relay_override(None, Some(uav_w * log_uniform(rng, 0.3, 3.0)));
         (index, own)
     });
     let relays = relays.collect();
@@ -126,9 +124,5 @@ fn source(rng: &mut ChaCha8Rng, d: f64, uav_w: f64, kind: Sources) -> Source {
     } else {
         log_uniform(rng, 1.0, 300.0)
     };
-    Source {
-        power_w: uav_w * power,
-        x_m: d * along,
-        y_m: d * aside * side,
-    }
+    make::source(uav_w * power, d * along, d * aside * side)
 }

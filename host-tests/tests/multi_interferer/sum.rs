@@ -1,11 +1,12 @@
 //! True sum of interferers: conversion of a scenario to a scene, and SIRs compared with the reference.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::{log_uniform, seed};
-use uav_relay_oracle::reference::{Link, Relay};
+use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::scene::{self, Scene};
-use uav_relay_scenario::{Field, Interference, RelayOverride, Scenario, Source};
+use uav_relay_scenario::{Field, Interference, Scenario, Source};
 
 use super::above;
 use super::scenes::scene;
@@ -44,10 +45,7 @@ fn the_inverse_sirs_of_the_sources_add_up() {
 }
 
 fn alone(scene: &Scene, source: &Source) -> Link {
-    let station = |relay: &scene::Relay| Relay {
-        altitude_m: relay.altitude_m,
-        power_w: relay.power_w,
-    };
+    let station = |relay: &scene::Relay| make::reference_relay(relay.altitude_m, relay.power_w);
     Link {
         distance_m: scene.distance_m,
         min_separation_m: scene.min_separation_m,
@@ -69,10 +67,7 @@ fn a_scene_has_the_scenarios_values() {
         altitude_max_m: 300.0,
         ..Scenario::default()
     };
-    let own = |altitude_m, power_w| RelayOverride {
-        altitude_m,
-        power_w,
-    };
+    let own = |altitude_m, power_w| make::relay_override(altitude_m, power_w);
     scenario.relays.insert(2, own(Some(30.0), Some(0.5)));
     scenario.relays.insert(3, own(None, Some(2.0)));
     scenario.relays.insert(9, own(Some(50.0), None));

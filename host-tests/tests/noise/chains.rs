@@ -1,6 +1,7 @@
 //! Chains by Algorithm 1 with receiver noise.
 
 use host_tests::flights::unharmed;
+use host_tests::make;
 use host_tests::placing::{Mixed, generator, hop_sirs_agree, optimum_is_found};
 use rand::{Rng, RngExt};
 use uav_relay::Method;
@@ -72,10 +73,7 @@ fn the_optimum_is_found_in_noise() {
 fn different_relays_in_noise_meet_the_agreed_target() {
     let mut rng = generator(1103);
     let mut all = Mixed::default();
-    let style = Style {
-        relays: 2..=30,
-        chain: Chain::Own,
-    };
+    let style = make::style(2..=30, Chain::Own);
     for _ in 0..count(400) {
         all.meet_what_they_agree_on(&drawn(&mut rng, &style));
     }
@@ -89,13 +87,7 @@ fn chains_in_noise_settle_to_the_bit_despite_faults() {
     let mut rng = generator(1104);
     let mut injected = 0;
     for round in 0..60 {
-        let link = as_relays_know_it(&random::link(
-            &mut rng,
-            &Style {
-                relays: 1..=12,
-                chain: Chain::Any,
-            },
-        ));
+        let link = as_relays_know_it(&random::link(&mut rng, &make::style(1..=12, Chain::Any)));
         let link = as_relays_know_it(&in_noise(&mut rng, &link));
         let Some((mission, profiles)) = of_link(&link, 1e-4) else {
             continue;

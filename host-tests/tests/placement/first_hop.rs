@@ -1,17 +1,14 @@
 //! First hop: its reach if the SIR rises before it falls, and its largest SIR.
 
 use host_tests::fixtures::paper;
+use host_tests::make;
 use uav_relay::optimiser::spacing::Hop;
 use uav_relay::place::CrossSection;
 use uav_relay::sir::{Sender, first_hop_ceiling};
-use uav_relay::{Interference, Interferer, Mission, MissionConfig, Placement};
+use uav_relay::{Interference, Mission, MissionConfig, Placement};
 
 fn first_hop(x_m: f32, distance_m: f32, altitude_m: f32) -> Hop {
-    let interferer = Interferer {
-        power_w: 80.0,
-        x_m,
-        y_m: 0.0,
-    };
+    let interferer = make::interferer(80.0, x_m, 0.0);
     let config = MissionConfig {
         distance_m,
         interference: Interference::Source(interferer),
@@ -74,11 +71,7 @@ fn the_ceiling_of_the_first_hop_is_never_below_what_a_scan_finds() {
         (-300.0, 200.0, 80.0, 1e-7),
         (-1e5, 3.0, 900.0, 1e-12),
     ] {
-        let interferer = Interferer {
-            power_w: 80.0,
-            x_m,
-            y_m,
-        };
+        let interferer = make::interferer(80.0, x_m, y_m);
         let mission = Mission::try_new(MissionConfig {
             interference: Interference::Source(interferer),
             noise_w,

@@ -1,6 +1,7 @@
 //! Placement compared with the f64 reference, on random and degenerate links.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use host_tests::placing::{
     Mixed, SINGLE, generator, hop_sirs_agree, optimum_is_found, places, profile_of, reaches_agree,
     solve, xs,
@@ -50,14 +51,7 @@ fn reaches_agree_with_the_reference() {
 #[test]
 fn the_reach_of_the_last_hop_agrees_with_the_reference() {
     let mut met = 0;
-    for (at, link) in random_links(
-        13,
-        4_000,
-        Style {
-            relays: 1..=1,
-            chain: Chain::Alike,
-        },
-    ) {
+    for (at, link) in random_links(13, 4_000, make::style(1..=1, Chain::Alike)) {
         let Some((mission, _)) = of_link(&link, 1e-4) else {
             continue;
         };
@@ -91,10 +85,7 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
 /// Tx and Rx are 10 m to 100 km apart, and the interferer is anywhere.
 #[test]
 fn the_optimum_is_found_on_random_links() {
-    let own_power = Style {
-        relays: 2..=50,
-        chain: Chain::OwnPower,
-    };
+    let own_power = make::style(2..=50, Chain::OwnPower);
     for (seed, count, style) in [(14, 4_000, Style::ALIKE), (16, 1_500, own_power)] {
         let (mut solved, mut hopeless, mut most_sweeps, mut worst) = (0, 0, 0, 0.0_f64);
         for (_, link) in random_links(seed, count, style) {
@@ -122,10 +113,7 @@ fn the_optimum_is_found_on_random_links() {
 #[test]
 fn chains_of_different_relays_meet_the_agreed_target() {
     let mut all = Mixed::default();
-    let style = Style {
-        relays: 2..=50,
-        chain: Chain::Own,
-    };
+    let style = make::style(2..=50, Chain::Own);
     for (_, link) in random_links(15, 1_500, style) {
         all.meet_what_they_agree_on(&link);
     }
@@ -142,10 +130,7 @@ fn chains_of_different_relays_meet_the_agreed_target() {
 #[test]
 fn a_feasible_target_counts_above_an_infeasible_one() {
     let mut rng = ChaCha8Rng::seed_from_u64(124);
-    let style = Style {
-        relays: 2..=50,
-        chain: Chain::Own,
-    };
+    let style = make::style(2..=50, Chain::Own);
     let link = (0..=667)
         .map(|_| random::link(&mut rng, &style))
         .last()

@@ -1,5 +1,6 @@
 //! Plans with altitudes and lateral offsets, compared with agreements and the reference optimiser.
 
+use host_tests::make;
 use host_tests::placing::{profile_of, reference};
 use uav_relay::{Method, Profile};
 use uav_relay_oracle::random::joint::Scenario as Drawn;
@@ -8,7 +9,7 @@ use uav_relay_oracle::recorded;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Corridor};
 use uav_relay_scenario::mission;
-use uav_relay_scenario::{AirGround, ChannelSpec, Interference, RelayOverride, Scenario, Source};
+use uav_relay_scenario::{AirGround, ChannelSpec, Interference, Scenario, Source};
 use uav_relay_sim::report::hop_sirs;
 use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::Ending;
@@ -84,11 +85,11 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
             excess_loss_nlos_db: 10.0 * (link.mu_nlos / link.mu_los).log10(),
             air_ground: AirGround::Weight(weight.clamp(0.0, 1.0)),
         },
-        interference: Interference::Sources(vec![Source {
-            power_w: link.interferer_w,
-            x_m: link.x_i,
-            y_m: link.y_i,
-        }]),
+        interference: Interference::Sources(vec![make::source(
+            link.interferer_w,
+            link.x_i,
+            link.y_i,
+        )]),
         ..Scenario::default()
     }
 }
@@ -134,10 +135,7 @@ fn a_plan_for_different_relays_is_what_they_agree_on() {
         (5, None, Some(2.0)),
         (7, Some(40.0), Some(0.7)),
     ] {
-        let own = RelayOverride {
-            altitude_m,
-            power_w,
-        };
+        let own = make::relay_override(altitude_m, power_w);
         scenario.relays.insert(index, own);
         for relays in [8, 15] {
             let short = short(&scenario, relays);
@@ -164,10 +162,7 @@ fn a_plan_for_different_relays_is_what_they_agree_on() {
 fn the_others_take_the_side_of_a_fixed_altitude() {
     for altitude_m in [60.0, 120.0, 200.0, 300.0] {
         let mut scenario = example("side.toml");
-        let own = RelayOverride {
-            altitude_m: Some(altitude_m),
-            power_w: None,
-        };
+        let own = make::relay_override(Some(altitude_m), None);
         scenario.relays.insert(3, own);
         let (agreed, planned) = (agreed(&scenario, 5), free(&scenario, Number::Of(5)).sir());
         println!("{altitude_m} m: {agreed} of {planned}");

@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use host_tests::placing::reference;
 use rand::{Rng, RngExt, SeedableRng};
-use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
+use uav_relay_oracle::random::{self, Chain, count, log_uniform};
 use uav_relay_oracle::recorded;
+use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Corridor, Place};
-use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_scenario::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
+    AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario,
 };
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, plan};
 
@@ -21,21 +22,18 @@ fn round(value: f64) -> f64 {
 /// Draws a scenario with interferers or a field of interference. The scenario may have ranges of altitude and lateral
 /// offset, a separation, and relays with their own altitude and power.
 fn scenario(rng: &mut impl Rng) -> Scenario {
-    let style = Style {
-        relays: 1..=1,
-        chain: Chain::Alike,
-    };
+    let style = make::style(1..=1, Chain::Alike);
     let link = random::link(rng, &style);
     let altitude_m = round(link.relays[0].altitude_m);
     let d = round(link.distance_m);
     let source = |rng: &mut ChaCha8Rng| {
         let link = random::link(rng, &style);
         let scale = d / link.distance_m;
-        Source {
-            power_w: round(link.interferer_w),
-            x_m: round(link.x_i * scale),
-            y_m: round(link.y_i * scale),
-        }
+        make::source(
+            round(link.interferer_w),
+            round(link.x_i * scale),
+            round(link.y_i * scale),
+        )
     };
     let mut own = ChaCha8Rng::seed_from_u64(rng.random());
     let interference = match rng.random_range(0..6) {
@@ -136,13 +134,7 @@ fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
         mu_nlos: channel.mu_nlos(),
         eta: channel.eta(),
         noise_w: 0.0,
-        relays: vec![
-            Relay {
-                altitude_m: scenario.altitude_m,
-                power_w: scenario.uav_w,
-            };
-            n
-        ],
+        relays: vec![make::reference_relay(scenario.altitude_m, scenario.uav_w); n],
     })
 }
 
@@ -262,12 +254,7 @@ fn plans_beside_the_line_have_the_stated_sir() {
             ..scenario(&mut rng)
         };
         let relays = rng.random_range(1..=8);
-        let ask = PlanRequest {
-            number: Number::Of(relays),
-            free_altitude: true,
-            x_m: None,
-            tolerance: 1e-4,
-        };
+        let ask = PlanRequest::of(relays, true, 1e-4);
         let corridor = Corridor {
             least_m: scenario.altitude_min_m,
             most_m: scenario.altitude_max_m,

@@ -1,6 +1,7 @@
 //! Lost and returning neighbours, and rejected settings.
 
 use host_tests::fixtures::mission;
+use host_tests::make;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::message::Message;
 use uav_relay::{Duration, Event, Identity, Instant, Port, Relay, Settings, Side};
@@ -124,10 +125,7 @@ type Change = fn(&mut Settings);
 fn settings_are_checked() {
     use uav_relay::SetupError;
     use uav_relay::{Profile, Schedule};
-    const UNKNOWN: Profile = Profile {
-        altitude_m: f32::NAN,
-        power_w: 1.0,
-    };
+    const UNKNOWN: Profile = make::profile(f32::NAN, 1.0);
     let with = |index, change: fn(&mut Settings)| {
         let mut settings = Settings::default();
         change(&mut settings);

@@ -1,14 +1,15 @@
 //! State table of a relay, row by row, through its public interface.
 
 use host_tests::bench::{self, Bench};
-use host_tests::fixtures::{self, NETWORK, mission};
+use host_tests::fixtures::{self, mission};
+use host_tests::make;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::frame::{self, Header, MAX_FRAME};
+use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay::wire::message::Message;
 use uav_relay::{
-    Duration, Event, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Phase,
-    Port, Relay, Settings,
+    Duration, Event, Instant, Interference, Interferer, Mission, MissionConfig, Phase, Port, Relay,
+    Settings,
 };
 
 mod lost;
@@ -61,16 +62,7 @@ fn first_sweep(head: &mut Relay) -> (Instant, Vec<u8>) {
 
 fn encode(sender: u16, destination: u16, message: &Message) -> Vec<u8> {
     let mut buffer = [0; MAX_FRAME];
-    let len = frame::encode(
-        Header {
-            network: NETWORK,
-            sender,
-            destination,
-            counter: 0,
-        },
-        message,
-        &mut buffer,
-    );
+    let len = frame::encode(make::header(sender, destination, 0), message, &mut buffer);
     buffer[..len].to_vec()
 }
 
@@ -158,10 +150,7 @@ fn a_relay_rebooted_during_a_pass_takes_part_again() {
         .run_until(Duration::from_millis(5_000), waits)
         .unwrap();
     bench.flying.clear();
-    let identity = Identity {
-        network: NETWORK,
-        index: 2,
-    };
+    let identity = make::identity(2);
     let rebooted = Relay::new(mission(3), identity, Settings::default(), 77, bench.now);
     bench.relays[1] = rebooted.unwrap();
     let took = bench.run_until(Duration::from_millis(60_000), Bench::holds);

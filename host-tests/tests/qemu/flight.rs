@@ -3,6 +3,7 @@
 use std::io::{ErrorKind, Read as _};
 
 use host_tests::firmware::emulator::Life;
+use host_tests::make;
 use mavlink::dialects::common::MavLandedState;
 use uav_relay::Placement;
 use uav_relay::flight::autopilot::Kind;
@@ -34,11 +35,7 @@ fn flight() -> Flight {
 
 fn agreed() -> Placement {
     let [x_m, y_m, altitude_m] = simulated(&flight())[0].map(f32::from_bits);
-    Placement {
-        x_m,
-        y_m,
-        altitude_m,
-    }
+    make::placement(x_m, y_m, altitude_m)
 }
 
 fn wait_for_line(fleet: &mut Fleet, text: &str) {
@@ -61,11 +58,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
             .iter()
             .any(|line| line.text.starts_with("autopilot: 1343.79"))
     });
-    let from = Placement {
-        x_m: to.x_m - 80.0,
-        y_m: 0.4,
-        altitude_m: 19.7,
-    };
+    let from = make::placement(to.x_m - 80.0, 0.4, 19.7);
     let socket = fleet.autopilots.remove(0);
     let mut vehicle = Vehicle::new(kind, socket, axis(), from, life);
 

@@ -1,6 +1,7 @@
 //! Emulated drones that find the interferer by their radios, compared with the simulated chain.
 
 use host_tests::firmware::emulator::Life;
+use host_tests::make;
 use mavlink::dialects::common::MavLandedState;
 use uav_relay::flight::autopilot::Kind;
 use uav_relay::flight::mavlink::incoming::noise_w;
@@ -45,13 +46,8 @@ fn scene() -> Scene {
 /// Returns the three positions to which a drone's pilot flies it for measurements.
 fn places(drone: u16) -> [Placement; 3] {
     let x_m = 336.0 * f32::from(drone);
-    [[-60.0, 70.0, 30.0], [20.0, -50.0, 45.0], [90.0, 10.0, 60.0]].map(|[x, y_m, altitude_m]| {
-        Placement {
-            x_m: x_m + x,
-            y_m,
-            altitude_m,
-        }
-    })
+    [[-60.0, 70.0, 30.0], [20.0, -50.0, 45.0], [90.0, 10.0, 60.0]]
+        .map(|[x, y_m, altitude_m]| make::placement(x_m + x, y_m, altitude_m))
 }
 
 /// Returns the noise value in a SiK radio's unit that a radio reports at a position.
@@ -171,11 +167,7 @@ fn three_drones_locate_an_interferer_like_the_simulation() {
         .iter()
         .map(|place| {
             let [x_m, y_m, altitude_m] = place.map(f32::from_bits);
-            Placement {
-                x_m,
-                y_m,
-                altitude_m,
-            }
+            make::placement(x_m, y_m, altitude_m)
         })
         .collect();
     for (vehicle, goal) in vehicles.iter_mut().zip(&goals) {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 
+use host_tests::make;
 use host_tests::python;
 use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -84,11 +85,11 @@ impl Mavsdk {
     pub(crate) fn target(&self) -> Option<Geodetic> {
         let is_target = |heard: &&Value| heard["mavpackettype"] == "SET_POSITION_TARGET_GLOBAL_INT";
         let last = self.heard.iter().rev().find(is_target)?;
-        Some(Geodetic {
-            lat_e7: last["lat_int"].as_i64().unwrap() as i32,
-            lon_e7: last["lon_int"].as_i64().unwrap() as i32,
-            amsl_mm: (last["alt"].as_f64().unwrap() * 1e3).round() as i32,
-        })
+        Some(make::geodetic(
+            last["lat_int"].as_i64().unwrap() as i32,
+            last["lon_int"].as_i64().unwrap() as i32,
+            (last["alt"].as_f64().unwrap() * 1e3).round() as i32,
+        ))
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
+use host_tests::make;
 use uav_relay::{Adjust, Method};
-use uav_relay_scenario::{BetaPoint, Field, Interference, Noise, RelayOverride, Scenario, Source};
+use uav_relay_scenario::{BetaPoint, Field, Interference, Noise, Scenario};
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
 
@@ -14,10 +15,7 @@ use crate::fleet::{Fleet, Image};
 /// has the number and the altitude of a relay that keeps this altitude.
 fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
-        let own = RelayOverride {
-            altitude_m: Some(altitude),
-            power_w: None,
-        };
+        let own = make::relay_override(Some(altitude), None);
         (index, own)
     };
     let scenario = Scenario {
@@ -25,11 +23,7 @@ fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Fli
         altitude_max_m: 300.0,
         lateral_min_m: -aside_m,
         lateral_max_m: aside_m,
-        interference: Interference::Sources(vec![Source {
-            power_w: 80.0,
-            x_m: 500.0,
-            y_m,
-        }]),
+        interference: Interference::Sources(vec![make::source(80.0, 500.0, y_m)]),
         ..Scenario::default()
     };
     Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)

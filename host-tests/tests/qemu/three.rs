@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use host_tests::firmware::emulator::Life;
+use host_tests::make;
 use mavlink::dialects::common::MavLandedState;
 use uav_relay::Placement;
 use uav_relay::flight::autopilot::Kind;
@@ -92,11 +93,7 @@ fn three_images_fly_with_autopilots_one_by_mavsdk() {
     let flight = Flight::new(&scenario(), 3, 1e-4, 7).unwrap();
     let to = simulated(&flight).into_iter().map(|place| {
         let [x_m, y_m, altitude_m] = place.map(f32::from_bits);
-        Placement {
-            x_m,
-            y_m,
-            altitude_m,
-        }
+        make::placement(x_m, y_m, altitude_m)
     });
     let to: Vec<Placement> = to.collect();
     // All drones start short of their positions, so that each has to make room for the one behind.

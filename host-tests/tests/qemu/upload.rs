@@ -8,9 +8,10 @@ use host_tests::firmware::emulator::{Kept, SPEED};
 use host_tests::firmware::journal::{Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
 use host_tests::firmware::uploads::{SECTORS, WORDS, pack_upload};
+use host_tests::make;
 use uav_relay::MAX_FRAME;
-use uav_relay::{Auth, Ground, Key, Progress, Side, Upload, Wiring};
-use uav_relay_scenario::{Interference, Scenario, Source};
+use uav_relay::{Ground, Progress, Side, Upload, Wiring};
+use uav_relay_scenario::{Interference, Scenario};
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::Secret;
@@ -26,11 +27,7 @@ const KEY: [u8; 32] = *b"three drones and one transmitter";
 /// Returns the flight to upload. Its interferer, altitude and power differ from the mission before flight.
 fn moved(uavs: u16) -> Flight {
     let scenario = Scenario {
-        interference: Interference::Sources(vec![Source {
-            power_w: 80.0,
-            x_m: 700.0,
-            y_m: -300.0,
-        }]),
+        interference: Interference::Sources(vec![make::source(80.0, 700.0, -300.0)]),
         altitude_m: 30.0,
         altitude_min_m: 30.0,
         altitude_max_m: 30.0,
@@ -64,10 +61,7 @@ struct Station {
 
 impl Station {
     fn new(loaded: &Flight, wiring: Wiring, socket: UnixStream) -> Self {
-        let auth = Auth {
-            key: Key::new(KEY),
-            epoch: 5,
-        };
+        let auth = make::auth(KEY, 5);
         let pause = Duration::from_millis(5);
         socket.set_read_timeout(Some(pause)).unwrap();
         Self {

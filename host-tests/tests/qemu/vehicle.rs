@@ -6,6 +6,7 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use host_tests::firmware::emulator::Life;
+use host_tests::make;
 use mavlink::dialects::common::{
     EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
     MavLandedState, MavMessage, MavModeFlag, MavState, MavType, POSITION_TARGET_GLOBAL_INT_DATA,
@@ -339,11 +340,7 @@ impl Vehicle {
     fn target(&mut self, target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) {
         assert_eq!((target.target_system, target.target_component), (SYSTEM, 1));
         assert_eq!(target.coordinate_frame as u32, 5);
-        let point = Geodetic {
-            lat_e7: target.lat_int,
-            lon_e7: target.lon_int,
-            amsl_mm: (target.alt * 1e3) as i32,
-        };
+        let point = make::geodetic(target.lat_int, target.lon_int, (target.alt * 1e3) as i32);
         let place = self.axis.place(point).unwrap();
         let at = self.now();
         self.told.push(SentTarget { at, place });

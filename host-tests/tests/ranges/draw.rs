@@ -1,12 +1,13 @@
 //! Random numbers, missions and settings from their whole ranges, with frequent limits.
 
+use host_tests::make;
 use rand::{Rng, RngExt};
 
 use uav_relay::channel::AirGround;
 use uav_relay::guard::config::{Geofence, GuardConfig};
 use uav_relay::{
-    Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local,
-    Measure, Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring, WithoutQuorum,
+    Adjust, Band, Channel, Duration, Field, FieldPoint, Interference, Listen, Local, Measure,
+    Method, Mission, MissionConfig, Schedule, Settings, Wiring, WithoutQuorum,
 };
 
 /// Draws a positive number: `usual`, `least`, `most`, or a log-uniform number from `least` to `most`.
@@ -58,10 +59,7 @@ pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
     let distance_m = scaled(rng, 1_000.0, 1.0, 1e6);
     let relays = rng.random_range(1..=most);
     let (one, other) = (scaled(rng, 20.0, 0.1, 1e5), scaled(rng, 120.0, 0.1, 1e5));
-    let band = Band {
-        least_m: one.min(other),
-        most_m: one.max(other),
-    };
+    let band = make::band(one.min(other), one.max(other));
     let altitude_m = match rng.random_range(0..3) {
         0 => band.least_m,
         1 => band.most_m,
@@ -70,10 +68,10 @@ pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
     let lateral = if rng.random() {
         Band::NONE
     } else {
-        Band {
-            least_m: -scaled(rng, 100.0, 1e-3, 1e5),
-            most_m: scaled(rng, 100.0, 1e-3, 1e5),
-        }
+        make::band(
+            -scaled(rng, 100.0, 1e-3, 1e5),
+            scaled(rng, 100.0, 1e-3, 1e5),
+        )
     };
     let room = distance_m / f32::from(relays);
     let config = MissionConfig {
@@ -85,21 +83,18 @@ pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
             _ => scaled(rng, 4.0, 1e-3, 1e5).min(0.9 * room),
         },
         tx_power_w: scaled(rng, 80.0, 1e-6, 1e6),
-        common: Profile {
-            altitude_m,
-            power_w: scaled(rng, 1.0, 1e-6, 1e6),
-        },
+        common: make::profile(altitude_m, scaled(rng, 1.0, 1e-6, 1e6)),
         band,
         lateral,
         channel: channel(rng)?,
         interference: match rng.random_range(0..8) {
             0 => Interference::Unknown,
             1 => Interference::Field(FIELDS[rng.random_range(0..FIELDS.len())]),
-            _ => Interference::Source(Interferer {
-                power_w: scaled(rng, 80.0, 1e-6, 1e9),
-                x_m: signed(rng, 0.5 * distance_m, 1e7),
-                y_m: signed(rng, 0.4 * distance_m, 1e7),
-            }),
+            _ => Interference::Source(make::interferer(
+                scaled(rng, 80.0, 1e-6, 1e9),
+                signed(rng, 0.5 * distance_m, 1e7),
+                signed(rng, 0.4 * distance_m, 1e7),
+            )),
         },
         noise_w: match rng.random_range(0..3) {
             0 => 0.0,
@@ -236,10 +231,9 @@ pub(crate) fn own(
     common: Settings,
     guarded: bool,
 ) -> Settings {
-    let profile = rng.random_ratio(1, 4).then(|| Profile {
-        altitude_m: scaled(rng, 20.0, 0.1, 1e5),
-        power_w: scaled(rng, 1.0, 1e-6, 1e6),
-    });
+    let profile = rng
+        .random_ratio(1, 4)
+        .then(|| make::profile(scaled(rng, 20.0, 0.1, 1e5), scaled(rng, 1.0, 1e-6, 1e6)));
     let held = profile.unwrap_or(mission.config().common);
     Settings {
         profile,

@@ -1,11 +1,12 @@
 //! Measured powers at drones' positions. For any inputs the chain agrees, also after the sensors recover.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use uav_relay::{
-    Auth, Duration, Ground, Instant, Interference, Key, Listen, MAX_FRAME, Mission, MissionConfig,
-    Placement, Sample, Settings, Side, Wiring,
+    Duration, Ground, Instant, Interference, Listen, MAX_FRAME, Mission, MissionConfig, Placement,
+    Sample, Settings, Side, Wiring,
 };
 
 use crate::draw::{mission, scaled, settings, signed};
@@ -34,11 +35,11 @@ fn power_w(rng: &mut ChaCha8Rng) -> f32 {
 /// Draws a position over the whole range that `handle_sample` may receive.
 fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     let far = [distance_m, 1e7, 1e9][rng.random_range(0..3)].max(2e-3);
-    Placement {
-        x_m: signed(rng, 0.5 * distance_m, far),
-        y_m: signed(rng, 0.0, far),
-        altitude_m: signed(rng, 20.0, far),
-    }
+    make::placement(
+        signed(rng, 0.5 * distance_m, far),
+        signed(rng, 0.0, far),
+        signed(rng, 20.0, far),
+    )
 }
 
 /// Gives all relays random interference measurements for 60 s, and then measurements of 1e-9 W. The measurements
@@ -170,10 +171,7 @@ fn one_power_everywhere_over_the_accepted_range() {
 /// Checks that a ground station accepts a measurement from 1e-30 W to 1e6 W, and no other number.
 #[test]
 fn a_ground_station_accepts_exactly_its_range() {
-    let auth = Auth {
-        key: Key::new([7; 32]),
-        epoch: 1,
-    };
+    let auth = make::auth([7; 32], 1);
     let limits = [
         0.0,
         1e-30,

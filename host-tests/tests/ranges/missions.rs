@@ -2,8 +2,9 @@
 
 use chacha20::ChaCha8Rng;
 use host_tests::bench::Bench;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
-use uav_relay::{Duration, Instant, Mission, Placement, Settings};
+use uav_relay::{Duration, Instant, Mission, Settings};
 
 use crate::draw::{mission, own, settings, slow_settings};
 use crate::each;
@@ -38,11 +39,7 @@ fn chain(
         let config = *mission.config();
         let step_m = config.distance_m / f32::from(config.relays + 1);
         for index in 1..=config.relays {
-            let at = Placement {
-                x_m: step_m * f32::from(index),
-                y_m: 0.0,
-                altitude_m: config.common.altitude_m,
-            };
+            let at = make::placement(step_m * f32::from(index), 0.0, config.common.altitude_m);
             line.relays[usize::from(index) - 1].handle_position(begin, at, begin);
         }
     }

@@ -1,6 +1,7 @@
 //! Positions, control and clocks of guarded relays. Numbers stay finite, and with true inputs the chain agrees.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::GuardConfig;
 use uav_relay::{Duration, Instant, Mission, Placement, Settings, Side};
@@ -17,11 +18,7 @@ fn anywhere(rng: &mut ChaCha8Rng) -> Placement {
         2 => signed(rng, 1_000.0, 6e3),
         _ => rng.random_range(-50.0..1_050.0),
     };
-    Placement {
-        x_m: metres(),
-        y_m: metres(),
-        altitude_m: metres(),
-    }
+    make::placement(metres(), metres(), metres())
 }
 
 fn fly(seed: u64) {
@@ -61,11 +58,11 @@ fn fly(seed: u64) {
         let now = line.now;
         for (index, relay) in (1_u16..).zip(&mut line.relays) {
             relay.handle_control(now, true);
-            let at = Placement {
-                x_m: 1_000.0 * f32::from(index) / f32::from(relays + 1),
-                y_m: 0.0,
-                altitude_m: 20.0,
-            };
+            let at = make::placement(
+                1_000.0 * f32::from(index) / f32::from(relays + 1),
+                0.0,
+                20.0,
+            );
             relay.handle_position(now, at, now);
         }
         line.run_for(Duration::from_millis(1_000));

@@ -1,6 +1,7 @@
 //! Reaches where formulas divide by zero or lose a root, with answers worked out by hand.
 
-use uav_relay_oracle::reference::{Link, Relay};
+use host_tests::make;
+use uav_relay_oracle::reference::Link;
 
 use super::close;
 
@@ -47,10 +48,7 @@ fn degenerate_reaches_are_right() {
         ..Link::paper(1)
     };
     let behind = Link {
-        relays: vec![Relay {
-            altitude_m: 50.0,
-            power_w: 1.0,
-        }],
+        relays: vec![make::reference_relay(50.0, 1.0)],
         ..behind
     };
     let (near, far) = (
@@ -107,10 +105,7 @@ fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
         x_i: 1026.0,
         y_i: 60.0,
         relays: [527.0, 298.0]
-            .map(|altitude_m| Relay {
-                altitude_m,
-                power_w: 2.2,
-            })
+            .map(|altitude_m| make::reference_relay(altitude_m, 2.2))
             .to_vec(),
         ..Link::paper(0)
     };
@@ -129,10 +124,7 @@ fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
 /// Tx, not straight above Tx.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
-    let relay = Relay {
-        altitude_m: 50.0,
-        power_w: 1e3,
-    };
+    let relay = make::reference_relay(50.0, 1e3);
     let link = Link {
         x_i: -10.0,
         y_i: 0.0,

@@ -1,7 +1,8 @@
 //! f64 reference, compared with a separate program, with brute force, and between its methods.
 
+use host_tests::make;
 use uav_relay_oracle::cases::{self, Case};
-use uav_relay_oracle::reference::{Link, Relay};
+use uav_relay_oracle::reference::Link;
 
 mod degenerate;
 mod random;
@@ -119,10 +120,8 @@ fn single_hops_match_the_file() {
 /// The SIRs are worked out by hand, because the two factors are equal in all cases of the file.
 #[test]
 fn each_hop_uses_its_own_path_loss() {
-    let relays = [(30.0, 4.0), (15.0, 7.0)].map(|(altitude_m, power_w)| Relay {
-        altitude_m,
-        power_w,
-    });
+    let relays = [(30.0, 4.0), (15.0, 7.0)]
+        .map(|(altitude_m, power_w)| make::reference_relay(altitude_m, power_w));
     let link = Link {
         distance_m: 100.0,
         min_separation_m: 0.0,
@@ -154,10 +153,7 @@ fn chains_match_the_file() {
         let mut link = case.link(0);
         link.relays = h
             .iter()
-            .map(|&altitude_m| Relay {
-                altitude_m,
-                power_w: case.params.p_u,
-            })
+            .map(|&altitude_m| make::reference_relay(altitude_m, case.params.p_u))
             .collect();
         let want = case.values().unwrap();
         close_all(&link.sir_hops(&x), &want, case.rtol, &case.id);

@@ -1,6 +1,7 @@
 //! Reference on random links, compared with scans, brute force, and between methods.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
@@ -23,61 +24,53 @@ fn for_links(
 #[test]
 fn reaches_agree_with_a_scan() {
     let (mut hills, mut blocked, mut inside) = (0, 0, 0);
-    for_links(
-        11,
-        3000,
-        &Style {
-            relays: 2..=2,
-            chain: Chain::Any,
-        },
-        |link, rng| {
-            let k = rng.random_range(1..=2);
-            let start = if k == 1 || rng.random_bool(0.2) {
-                0.0
-            } else {
-                link.distance_m * rng.random::<f64>()
-            };
-            let span = link.distance_m - start;
-            // A third of the interferers are behind the sender, where the SIR has a maximum.
-            let mut link = link.clone();
-            let behind = rng.random_bool(0.33);
-            if behind {
-                link.x_i = start - span * log_uniform(rng, 1e-3, 1.0);
-            }
-            let sir = |x: f64| link.sir_relay(k, start, x).unwrap();
-            let miss = if behind {
-                1.0
-            } else {
-                log_uniform(rng, 0.5, 1.5)
-            };
-            let target = sir(start + span * log_uniform(rng, 1e-4, 1.0)) * miss;
-            let reach = link.farthest(k, start, target);
-            let samples = (0..=2000).map(|i| start + span * (f64::from(i) / 2000.0).powi(2));
-            let seen = samples
-                .filter(|&x| x <= link.distance_m && sir(x) >= target)
-                .fold(f64::NEG_INFINITY, f64::max);
-            if let Some(x) = reach {
+    for_links(11, 3000, &make::style(2..=2, Chain::Any), |link, rng| {
+        let k = rng.random_range(1..=2);
+        let start = if k == 1 || rng.random_bool(0.2) {
+            0.0
+        } else {
+            link.distance_m * rng.random::<f64>()
+        };
+        let span = link.distance_m - start;
+        // A third of the interferers are behind the sender, where the SIR has a maximum.
+        let mut link = link.clone();
+        let behind = rng.random_bool(0.33);
+        if behind {
+            link.x_i = start - span * log_uniform(rng, 1e-3, 1.0);
+        }
+        let sir = |x: f64| link.sir_relay(k, start, x).unwrap();
+        let miss = if behind {
+            1.0
+        } else {
+            log_uniform(rng, 0.5, 1.5)
+        };
+        let target = sir(start + span * log_uniform(rng, 1e-4, 1.0)) * miss;
+        let reach = link.farthest(k, start, target);
+        let samples = (0..=2000).map(|i| start + span * (f64::from(i) / 2000.0).powi(2));
+        let seen = samples
+            .filter(|&x| x <= link.distance_m && sir(x) >= target)
+            .fold(f64::NEG_INFINITY, f64::max);
+        if let Some(x) = reach {
+            assert!(
+                x >= seen && (start..=link.distance_m).contains(&x),
+                "{x} {seen} {link:?}"
+            );
+            assert!(sir(x) >= target * (1.0 - 1e-15));
+            // Beyond the reach no position meets the target.
+            for i in 1..=50 {
+                let beyond = x + (link.distance_m - x) * f64::from(i) / 50.0;
                 assert!(
-                    x >= seen && (start..=link.distance_m).contains(&x),
-                    "{x} {seen} {link:?}"
+                    x == link.distance_m || sir(beyond) < target * (1.0 + 1e-12),
+                    "{x} {beyond} {link:?}"
                 );
-                assert!(sir(x) >= target * (1.0 - 1e-15));
-                // Beyond the reach no position meets the target.
-                for i in 1..=50 {
-                    let beyond = x + (link.distance_m - x) * f64::from(i) / 50.0;
-                    assert!(
-                        x == link.distance_m || sir(beyond) < target * (1.0 + 1e-12),
-                        "{x} {beyond} {link:?}"
-                    );
-                }
-                inside += u32::from(x < link.distance_m);
-                hills += u32::from(x < link.distance_m && sir(start) < target);
-            } else {
-                assert!(seen == f64::NEG_INFINITY, "{seen} {link:?}");
-                blocked += 1;
             }
-        },
-    );
+            inside += u32::from(x < link.distance_m);
+            hills += u32::from(x < link.distance_m && sir(start) < target);
+        } else {
+            assert!(seen == f64::NEG_INFINITY, "{seen} {link:?}");
+            blocked += 1;
+        }
+    });
     println!("inside {inside}, of them over a hill {hills}; blocked {blocked}");
     assert!(inside > 500 && hills > 100 && blocked > 100);
 }
@@ -136,10 +129,7 @@ fn greedy_and_exact_agree_at_a_common_altitude() {
     for_links(
         31,
         300,
-        &Style {
-            relays: 1..=30,
-            chain: Chain::OwnPower,
-        },
+        &make::style(1..=30, Chain::OwnPower),
         |link, rng| {
             let Some(optimum) = link.optimum() else {
                 return;
@@ -160,10 +150,7 @@ fn greedy_and_exact_agree_at_a_common_altitude() {
 /// positions that it can reach, and then chooses positions backward from Rx.
 #[test]
 fn placements_meet_their_target() {
-    let style = Style {
-        relays: 2..=12,
-        chain: Chain::OwnAltitude,
-    };
+    let style = make::style(2..=12, Chain::OwnAltitude);
     for_links(32, 1000, &style, |link, rng| {
         let Some(optimum) = link.optimum() else {
             return;

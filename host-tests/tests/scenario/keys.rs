@@ -14,181 +14,84 @@ struct Row {
     range: &'static str,
 }
 
-type Values = [&'static str; 4];
+/// Numeric keys: path, lines of the table with `@` for the value, four values, and the stated range.
+///
+/// The values are one below the range, its limits, and one above. Semicolons end lines.
+const KEYS: &str = r#"
+geometry.distance_m | distance_m = @; altitude_m = 20 | 0.99 1 1e6 1000000.5 | 1 to 1e6 m
+geometry.altitude_m | distance_m = 9; altitude_m = @ | 0.0999 0.1 1e4 10000.1 | 0.1 to 10000 m
+geometry.altitude_min_m | distance_m = 9; altitude_m = 1e4; altitude_min_m = @ | 0.0999 0.1 1e4 10000.1 | 0.1 to 10000 m
+geometry.altitude_max_m | distance_m = 9; altitude_m = 0.1; altitude_max_m = @ | 0.0999 0.1 1e4 10000.1 | 0.1 to 10000 m
+geometry.lateral_min_m | distance_m = 9; altitude_m = 9; lateral_min_m = @ | -100001 -1e5 0 0.5 | -1e5 to 0 m
+geometry.lateral_max_m | distance_m = 9; altitude_m = 9; lateral_max_m = @ | -0.5 0 1e5 100001 | 0 to 1e5 m
+geometry.min_separation_m | distance_m = 9; altitude_m = 9; min_separation_m = @ | -1e-9 0 1e5 100001 | 0 to 1e5 m
+power.tx_w | tx_w = @; uav_w = 1 | 0.9e-6 1e-6 1e6 1000001 | 1e-6 to 1e6 W
+power.tx_dbm | tx_dbm = @; uav_w = 1 | -30.1 -30 90 90.1 | -30 to 90 dBm
+power.tx_gain_dbi | tx_w = 1; uav_w = 1; tx_gain_dbi = @ | -30.1 -30 60 60.1 | -30 to 60 dBi
+power.tx_eirp_dbm | tx_eirp_dbm = @; uav_w = 1 | -30.1 -30 90 90.1 | -30 to 90 dBm
+power.uav_w | tx_w = 1; uav_w = @ | 0.9e-6 1e-6 1e6 1000001 | 1e-6 to 1e6 W
+power.uav_dbm | tx_w = 1; uav_dbm = @ | -30.1 -30 90 90.1 | -30 to 90 dBm
+power.uav_gain_dbi | tx_w = 1; uav_w = 1; uav_gain_dbi = @ | -30.1 -30 60 60.1 | -30 to 60 dBi
+power.rx_w | tx_w = 1; uav_w = 1; rx_w = @ | 0.9e-6 1e-6 1e6 1000001 | 1e-6 to 1e6 W
+power.rx_dbm | tx_w = 1; uav_w = 1; rx_dbm = @ | -30.1 -30 90 90.1 | -30 to 90 dBm
+power.rx_gain_dbi | tx_w = 1; uav_w = 1; rx_gain_dbi = @ | -30.1 -30 60 60.1 | -30 to 60 dBi
+channel.carrier_hz | carrier_hz = @ | 999999 1e6 1e12 1.1e12 | 1e6 to 1e12 Hz
+channel.excess_loss_los_db | excess_loss_los_db = @; excess_loss_nlos_db = 200 | -0.01 0.0 200.0 200.1 | 0 to 200 dB
+channel.excess_loss_nlos_db | excess_loss_los_db = 0; excess_loss_nlos_db = @ | -0.01 0.0 200.0 200.1 | 0 to 200 dB
+channel.air_ground | air_ground = @ | -0.01 0 1 1.01 | "los", "nlos" or a number, 0 to 1
+interferer[1].power_w | power_w = @; x_m = 0; y_m = 9 | 0 1e-6 1e9 1e10 | 1e-6 to 1e9 W
+interferer[1].power_dbm | power_dbm = @; x_m = 0; y_m = 9 | -30.1 -30 120 120.1 | -30 to 120 dBm
+interferer[1].gain_dbi | power_w = 1; gain_dbi = @; x_m = 0; y_m = 9 | -30.1 -30 60 60.1 | -30 to 60 dBi
+interferer[1].eirp_dbm | eirp_dbm = @; x_m = 0; y_m = 9 | -30.1 -30 120 120.1 | -30 to 120 dBm
+interferer[1].x_m | power_w = 1; x_m = @; y_m = 9 | -10000001 -1e7 1e7 1.01e7 | -1e7 to 1e7 m
+interferer[1].y_m | power_w = 1; x_m = 9; y_m = @ | -10000001 -1e7 1e7 1.01e7 | -1e7 to 1e7 m
+interferer[1].mast_m | power_w = 1; x_m = 0; y_m = 9; mast_m = @ | -0.1 0 1000 1000.1 | 0 to 1000 m
+relay[1].index | index = @; power_w = 1 | 0 1 1000 1001 | a whole number, 1 to 1000
+relay[1].altitude_m | index = 1; altitude_m = @ | 0.0999 0.1 1e4 10000.1 | 0.1 to 10000 m
+relay[1].power_w | index = 1; power_w = @ | 0.9e-6 1e-6 1e6 1000001 | 1e-6 to 1e6 W
+relay[1].power_dbm | index = 1; power_dbm = @ | -30.1 -30 90 90.1 | -30 to 90 dBm
+field.i_max_w | i_max_w = @; beta = [{ x_m = 0, alpha = 4, beta = 2 }] | 0 1e-30 1e6 1.1e6 | 1e-30 to 1e6 W
+field.beta[0].x_m | { x_m = @, alpha = 2, beta = 2 } | -10000001 -1e7 1e7 1.01e7 | -1e7 to 1e7 m
+field.beta[0].alpha | { x_m = 0, alpha = @, beta = 2 } | 1.0 1.0000001 1e6 1.1e6 | above 1 to 1e6
+field.beta[0].beta | { x_m = 0, alpha = 2, beta = @ } | 0.0 1e-9 1e6 1.1e6 | above 0 to 1e6"#;
 
-const ALTITUDES: (Values, &str) = (["0.0999", "0.1", "1e4", "10000.1"], "0.1 to 10000 m");
-const POWERS: (Values, &str) = (["0.9e-6", "1e-6", "1e6", "1000001"], "1e-6 to 1e6 W");
-const POWERS_DBM: (Values, &str) = (["-30.1", "-30", "90", "90.1"], "-30 to 90 dBm");
-const SOURCES_DBM: (Values, &str) = (["-30.1", "-30", "120", "120.1"], "-30 to 120 dBm");
-const GAINS: (Values, &str) = (["-30.1", "-30", "60", "60.1"], "-30 to 60 dBi");
-const PLACES: (Values, &str) = (["-10000001", "-1e7", "1e7", "1.01e7"], "-1e7 to 1e7 m");
-const LOSSES: (Values, &str) = (["-0.01", "0.0", "200.0", "200.1"], "0 to 200 dB");
-
-fn row(key: &'static str, file: String, values: (Values, &'static str)) -> Row {
-    let ([below, low, high, above], range) = values;
-    Row {
-        key,
-        file,
-        below,
-        low,
-        high,
-        above,
-        range,
+/// Returns a scenario file in which the table of `key` has `lines`.
+fn file_with(key: &str, lines: &str) -> String {
+    let (table, _) = key.rsplit_once('.').unwrap();
+    match table {
+        "geometry" => format!("[geometry]\n{lines}\n{POWER}{INTERFERER}"),
+        "power" => format!("{GEOMETRY}{INTERFERER}[power]\n{lines}\n"),
+        "relay[1]" => small(&format!(
+            "[[relay]]\nindex = 7\naltitude_m = 9\n[[relay]]\n{lines}\n"
+        )),
+        "interferer[1]" => small(&format!("[[interferer]]\n{lines}\n")),
+        "field" => format!("{GEOMETRY}{POWER}[field]\n{lines}\n"),
+        "field.beta[0]" => {
+            format!("{GEOMETRY}{POWER}[field]\ni_max_w = 1\nbeta = [{lines}]\n")
+        }
+        _ => small(&format!("[{table}]\n{lines}\n")),
     }
 }
 
-fn geometry_and_power_rows() -> Vec<Row> {
-    let geometry = |lines: &str| format!("[geometry]\n{lines}\n{POWER}{INTERFERER}");
-    let distances = (["0.99", "1", "1e6", "1000000.5"], "1 to 1e6 m");
-    let separations = (["-1e-9", "0", "1e5", "100001"], "0 to 1e5 m");
-    let low = "distance_m = 9\naltitude_m = 1e4\naltitude_min_m = @";
-    let high = "distance_m = 9\naltitude_m = 0.1\naltitude_max_m = @";
-    let left = "distance_m = 9\naltitude_m = 9\nlateral_min_m = @";
-    let right = "distance_m = 9\naltitude_m = 9\nlateral_max_m = @";
-    let lefts = (["-100001", "-1e5", "0", "0.5"], "-1e5 to 0 m");
-    let rights = (["-0.5", "0", "1e5", "100001"], "0 to 1e5 m");
-    let apart = "distance_m = 9\naltitude_m = 9\nmin_separation_m = @";
-    vec![
-        row(
-            "geometry.distance_m",
-            geometry("distance_m = @\naltitude_m = 20"),
-            distances,
-        ),
-        row(
-            "geometry.altitude_m",
-            geometry("distance_m = 9\naltitude_m = @"),
-            ALTITUDES,
-        ),
-        row("geometry.altitude_min_m", geometry(low), ALTITUDES),
-        row("geometry.altitude_max_m", geometry(high), ALTITUDES),
-        row("geometry.lateral_min_m", geometry(left), lefts),
-        row("geometry.lateral_max_m", geometry(right), rights),
-        row("geometry.min_separation_m", geometry(apart), separations),
-    ]
-}
-
-fn power_rows() -> Vec<Row> {
-    let power = |lines: &str| format!("{GEOMETRY}{INTERFERER}[power]\n{lines}\n");
-    let both = |line: &str| power(&format!("tx_w = 1\nuav_w = 1\n{line} = @"));
-    vec![
-        row("power.tx_w", power("tx_w = @\nuav_w = 1"), POWERS),
-        row("power.tx_dbm", power("tx_dbm = @\nuav_w = 1"), POWERS_DBM),
-        row("power.tx_gain_dbi", both("tx_gain_dbi"), GAINS),
-        row(
-            "power.tx_eirp_dbm",
-            power("tx_eirp_dbm = @\nuav_w = 1"),
-            POWERS_DBM,
-        ),
-        row("power.uav_w", power("tx_w = 1\nuav_w = @"), POWERS),
-        row("power.uav_dbm", power("tx_w = 1\nuav_dbm = @"), POWERS_DBM),
-        row("power.uav_gain_dbi", both("uav_gain_dbi"), GAINS),
-        row("power.rx_w", both("rx_w"), POWERS),
-        row("power.rx_dbm", both("rx_dbm"), POWERS_DBM),
-        row("power.rx_gain_dbi", both("rx_gain_dbi"), GAINS),
-    ]
-}
-
-fn channel_and_interferer_rows() -> Vec<Row> {
-    let channel = |lines: &str| small(&format!("[channel]\n{lines}\n"));
-    let source = |lines: &str| small(&format!("[[interferer]]\n{lines}\n"));
-    let carriers = (["999999", "1e6", "1e12", "1.1e12"], "1e6 to 1e12 Hz");
-    let links = (
-        ["-0.01", "0", "1", "1.01"],
-        "\"los\", \"nlos\" or a number, 0 to 1",
-    );
-    let powers = (["0", "1e-6", "1e9", "1e10"], "1e-6 to 1e9 W");
-    let los = "excess_loss_los_db = @\nexcess_loss_nlos_db = 200";
-    let nlos = "excess_loss_los_db = 0\nexcess_loss_nlos_db = @";
-    vec![
-        row("channel.carrier_hz", channel("carrier_hz = @"), carriers),
-        row("channel.excess_loss_los_db", channel(los), LOSSES),
-        row("channel.excess_loss_nlos_db", channel(nlos), LOSSES),
-        row("channel.air_ground", channel("air_ground = @"), links),
-        row(
-            "interferer[1].power_w",
-            source("power_w = @\nx_m = 0\ny_m = 9"),
-            powers,
-        ),
-        row(
-            "interferer[1].power_dbm",
-            source("power_dbm = @\nx_m = 0\ny_m = 9"),
-            SOURCES_DBM,
-        ),
-        row(
-            "interferer[1].gain_dbi",
-            source("power_w = 1\ngain_dbi = @\nx_m = 0\ny_m = 9"),
-            GAINS,
-        ),
-        row(
-            "interferer[1].eirp_dbm",
-            source("eirp_dbm = @\nx_m = 0\ny_m = 9"),
-            SOURCES_DBM,
-        ),
-        row(
-            "interferer[1].x_m",
-            source("power_w = 1\nx_m = @\ny_m = 9"),
-            PLACES,
-        ),
-        row(
-            "interferer[1].y_m",
-            source("power_w = 1\nx_m = 9\ny_m = @"),
-            PLACES,
-        ),
-        row(
-            "interferer[1].mast_m",
-            source("power_w = 1\nx_m = 0\ny_m = 9\nmast_m = @"),
-            (["-0.1", "0", "1000", "1000.1"], "0 to 1000 m"),
-        ),
-    ]
-}
-
-fn relay_and_field_rows() -> Vec<Row> {
-    let first = "[[relay]]\nindex = 7\naltitude_m = 9\n";
-    let relay = |lines: &str| small(&format!("{first}[[relay]]\n{lines}\n"));
-    let field = |lines: &str| format!("{GEOMETRY}{POWER}[field]\n{lines}\n");
-    let beta = |entry: &str| field(&format!("i_max_w = 1\nbeta = [{entry}]"));
-    let indices = (["0", "1", "1000", "1001"], "a whole number, 1 to 1000");
-    let bounds = (["0", "1e-30", "1e6", "1.1e6"], "1e-30 to 1e6 W");
-    let alphas = (["1.0", "1.0000001", "1e6", "1.1e6"], "above 1 to 1e6");
-    let betas = (["0.0", "1e-9", "1e6", "1.1e6"], "above 0 to 1e6");
-    let bound = "i_max_w = @\nbeta = [{ x_m = 0, alpha = 4, beta = 2 }]";
-    vec![
-        row("relay[1].index", relay("index = @\npower_w = 1"), indices),
-        row(
-            "relay[1].altitude_m",
-            relay("index = 1\naltitude_m = @"),
-            ALTITUDES,
-        ),
-        row("relay[1].power_w", relay("index = 1\npower_w = @"), POWERS),
-        row(
-            "relay[1].power_dbm",
-            relay("index = 1\npower_dbm = @"),
-            POWERS_DBM,
-        ),
-        row("field.i_max_w", field(bound), bounds),
-        row(
-            "field.beta[0].x_m",
-            beta("{ x_m = @, alpha = 2, beta = 2 }"),
-            PLACES,
-        ),
-        row(
-            "field.beta[0].alpha",
-            beta("{ x_m = 0, alpha = @, beta = 2 }"),
-            alphas,
-        ),
-        row(
-            "field.beta[0].beta",
-            beta("{ x_m = 0, alpha = 2, beta = @ }"),
-            betas,
-        ),
-    ]
-}
-
 fn rows() -> Vec<Row> {
-    let mut rows = geometry_and_power_rows();
-    rows.extend(power_rows());
-    rows.extend(channel_and_interferer_rows());
-    rows.extend(relay_and_field_rows());
+    let mut rows = Vec::new();
+    for line in KEYS.trim_start().lines() {
+        let [key, lines, values, range] = line.split(" | ").collect::<Vec<_>>()[..] else {
+            panic!("{line}");
+        };
+        let [below, low, high, above] = values.split(' ').collect::<Vec<_>>()[..] else {
+            panic!("{line}");
+        };
+        rows.push(Row {
+            key,
+            file: file_with(key, &lines.replace("; ", "\n")),
+            below,
+            low,
+            high,
+            above,
+            range,
+        });
+    }
     rows
 }
 

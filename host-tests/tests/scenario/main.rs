@@ -9,6 +9,8 @@ mod mistakes;
 mod planned;
 mod power;
 
+use std::fmt::Write as _;
+
 use uav_relay_scenario::{Problem, Scenario, ScenarioError};
 
 /// First part of the smallest valid files. `POWER`, and `INTERFERER` or `FIELD`, complete them.
@@ -42,4 +44,17 @@ fn one_line(error: &ScenarioError, file: &str, parts: &[&str]) {
     for part in parts {
         assert!(line.contains(part), "no {part:?} in: {line}");
     }
+}
+
+/// Returns the kind of problem and the error line of each file.
+fn refusals(files: &[String]) -> String {
+    let mut all = String::new();
+    for text in files {
+        let error = parse(text).expect_err(text);
+        one_line(&error, "flight.toml", &[]);
+        let problem = format!("{:?}", error.problem);
+        let kind = problem.split('(').next().unwrap_or_default();
+        writeln!(all, "{kind}\n    {error}").unwrap();
+    }
+    all
 }

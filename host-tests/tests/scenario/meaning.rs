@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use uav_relay_scenario::{
-    AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise, RelayOverride, Source,
-};
+use host_tests::make;
+use uav_relay_scenario::{AirGround, BetaPoint, ChannelSpec, Field, Interference, Noise};
 
 use super::*;
 
@@ -61,33 +60,13 @@ fn every_key_sets_its_value() {
             air_ground: AirGround::Weight(0.75),
         },
         interference: Interference::Sources(vec![
-            Source {
-                power_w: 40.0,
-                x_m: -100.0,
-                y_m: 400.0,
-            },
-            Source {
-                power_w: 60.0,
-                x_m: 1700.0,
-                y_m: -300.0,
-            },
+            make::source(40.0, -100.0, 400.0),
+            make::source(60.0, 1700.0, -300.0),
         ]),
         noise: Noise::default(),
         relays: BTreeMap::from([
-            (
-                3,
-                RelayOverride {
-                    altitude_m: Some(30.0),
-                    power_w: Some(0.5),
-                },
-            ),
-            (
-                1,
-                RelayOverride {
-                    altitude_m: None,
-                    power_w: Some(4.0),
-                },
-            ),
+            (3, make::relay_override(Some(30.0), Some(0.5))),
+            (1, make::relay_override(None, Some(4.0))),
         ]),
         ..Scenario::default()
     };

@@ -1,22 +1,8 @@
 //! Missing, unknown, contradictory and unreadable contents; the error lines are in `snapshots`.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::*;
-
-/// Returns the kind of problem and the error line of each file.
-fn refusals(files: &[String]) -> String {
-    let mut all = String::new();
-    for text in files {
-        let error = parse(text).expect_err(text);
-        one_line(&error, "flight.toml", &[]);
-        let problem = format!("{:?}", error.problem);
-        let kind = problem.split('(').next().unwrap_or_default();
-        writeln!(all, "{kind}\n    {error}").unwrap();
-    }
-    all
-}
 
 fn in_field(text: &str) -> String {
     format!("{GEOMETRY}{POWER}{text}")

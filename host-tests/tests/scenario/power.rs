@@ -1,6 +1,7 @@
 //! Powers, gains and noise in decibel units: the chain reproduces the link budget.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay_scenario::mission::mission;
 use uav_relay_scenario::scene::Scene;
@@ -190,11 +191,7 @@ fn the_chain_has_the_sinrs_of_a_link_budget() {
         let (mission, _) = mission(&scenario, 2, 1e-4).unwrap();
         let profile = mission.config().common;
         let held = places.map(|(x, h)| {
-            let place = uav_relay::Placement {
-                x_m: x as f32,
-                y_m: 0.0,
-                altitude_m: h as f32,
-            };
+            let place = make::placement(x as f32, 0.0, h as f32);
             (place, profile)
         });
         for (on_board, told) in hop_sirs(&mission, &held).iter().zip(told) {

@@ -1,6 +1,7 @@
 //! Static sources: fraction of the optimum by number of agreements.
 
-use uav_relay::{Interference, Interferer};
+use host_tests::make;
+use uav_relay::Interference;
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_tools::figures::sheet::FigureError;
 use uav_relay_tools::listening::{
@@ -19,11 +20,11 @@ type Limits = &'static [(usize, f64, f64)];
 /// Returns a setup whose mission has a wrong interferer: mirrored, 100 times as strong, and nearer.
 fn guessed(wild: &RandomScene) -> Result<Setup, FigureError> {
     let source = wild.scene()?.sources[0].clone();
-    wild.setup(Interference::Source(Interferer {
-        power_w: (100.0 * source.power_w) as f32,
-        x_m: (1_000.0 - source.x_m) as f32,
-        y_m: (-0.3 * source.y_m) as f32,
-    }))
+    wild.setup(Interference::Source(make::interferer(
+        (100.0 * source.power_w) as f32,
+        (1_000.0 - source.x_m) as f32,
+        (-0.3 * source.y_m) as f32,
+    )))
 }
 
 /// Returns a setup with 1 dB of shadowing at each position, whose relays also measure in flight.

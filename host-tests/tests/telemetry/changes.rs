@@ -1,6 +1,7 @@
 //! Changes of a relay's state: each reaches the station in time, and the last one always.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Duration, GuardConfig, Instant, Placement, Report, Side, Upload};
@@ -33,11 +34,7 @@ fn report(chain: &Chain, relay: u16) -> Option<Report> {
 fn place(rng: &mut ChaCha8Rng) -> Placement {
     let [x_m, y_m, altitude_m] =
         [800, 40, 120].map(|quarters| rng.random_range(0..quarters) as f32 / 4.0);
-    Placement {
-        x_m,
-        y_m,
-        altitude_m,
-    }
+    make::placement(x_m, y_m, altitude_m)
 }
 
 /// Checks that a position that the autopilot gives a relay only once still reaches the station.

@@ -1,5 +1,6 @@
 //! Known values: of an independent program, counterexamples to the printed theorems, degenerate cases.
 
+use host_tests::make;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::Link;
 use uav_relay_tools::single::theorems;
@@ -114,10 +115,7 @@ fn counterexamples_and_degenerate_places() {
         mu_los: 1.0,
         mu_nlos: kappa,
         eta: 1.0,
-        relays: vec![uav_relay_oracle::reference::Relay {
-            altitude_m: 5.0,
-            power_w,
-        }],
+        relays: vec![make::reference_relay(5.0, power_w)],
         ..Link::paper(1)
     };
     let best = |link: &Link, band| {

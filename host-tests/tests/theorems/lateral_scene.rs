@@ -1,8 +1,9 @@
 //! Scene with room above and to the sides, and its optimum by brute force.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{Rng, RngExt, SeedableRng};
-use uav_relay::{Band, Mission, MissionConfig};
+use uav_relay::{Mission, MissionConfig};
 use uav_relay_oracle::random::{self};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Place, sir};
@@ -19,10 +20,7 @@ impl LateralScene {
     pub(crate) fn new(scene: Scene, lateral: (f64, f64)) -> Self {
         let lateral = (lateral.0 as f32, lateral.1 as f32);
         let config = MissionConfig {
-            lateral: Band {
-                least_m: lateral.0,
-                most_m: lateral.1,
-            },
+            lateral: make::band(lateral.0, lateral.1),
             ..*scene.mission.config()
         };
         let mission = Mission::try_new(config).unwrap();

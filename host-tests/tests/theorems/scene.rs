@@ -1,10 +1,11 @@
 //! Single relay and interferer, with SIRs that share no formula with the crate.
 
+use host_tests::make;
 use rand::{Rng, RngExt};
-use uav_relay::{Band, Mission, MissionConfig};
+use uav_relay::{Mission, MissionConfig};
 use uav_relay_oracle::cases::Case;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
-use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
+use uav_relay_oracle::random::{self, Chain, log_uniform};
 use uav_relay_oracle::reference::Link;
 use uav_relay_tools::single::Found;
 
@@ -23,10 +24,7 @@ impl Scene {
         link.relays[0].altitude_m = band.0;
         let (mission, _) = of_link(&link, 1e-4).unwrap();
         let config = MissionConfig {
-            band: Band {
-                least_m: band.0 as f32,
-                most_m: band.1 as f32,
-            },
+            band: make::band(band.0 as f32, band.1 as f32),
             ..*mission.config()
         };
         Self {
@@ -39,10 +37,7 @@ impl Scene {
     /// Draws a scene with Tx and Rx 10 m to 100 km apart and the interferer anywhere. The lowest altitude is 0.002 to
     /// 0.5 of that distance.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
-        let style = Style {
-            relays: 1..=1,
-            chain: Chain::Alike,
-        };
+        let style = make::style(1..=1, Chain::Alike);
         let link = random::link(rng, &style);
         let low = link.relays[0].altitude_m;
         let high = if rng.random_bool(0.1) {

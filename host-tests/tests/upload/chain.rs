@@ -1,6 +1,7 @@
 //! Uploads to a chain on good links.
 
-use uav_relay::{Adjust, Band, Local, Method, Profile, Schedule};
+use host_tests::make;
+use uav_relay::{Band, Local, Method, Profile, Schedule};
 
 use super::*;
 
@@ -88,18 +89,12 @@ fn fitted_slots_are_uploaded_and_flown_by_all() {
 #[test]
 fn a_new_altitude_band_is_flown_to() {
     let base = MissionConfig {
-        band: Band {
-            least_m: 15.0,
-            most_m: 60.0,
-        },
+        band: make::band(15.0, 60.0),
         ..*mission(5).config()
     };
     let base = Mission::try_new(base).unwrap();
     let config = MissionConfig {
-        band: Band {
-            least_m: 90.0,
-            most_m: 180.0,
-        },
+        band: make::band(90.0, 180.0),
         common: Profile {
             altitude_m: 120.0,
             ..base.config().common
@@ -108,22 +103,12 @@ fn a_new_altitude_band_is_flown_to() {
     };
     for method in [
         Method::Joint,
-        Method::Adjust(Adjust {
-            rounds: 20,
-            explore_m: 10.0,
-            local: Local::Fine,
-        }),
+        Method::Adjust(make::adjust(20, 10.0, Local::Fine)),
     ] {
         let mut setup = signed(base, true);
         setup.settings.method = method;
         // One relay keeps its own altitude and power, whatever the mission.
-        setup.profiles = vec![(
-            2,
-            Profile {
-                altitude_m: 100.0,
-                power_w: 1.5,
-            },
-        )];
+        setup.profiles = vec![(2, make::profile(100.0, 1.5))];
         setup.held = vec![2];
         fly(setup, Side::Upstream, config);
     }

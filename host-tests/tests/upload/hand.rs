@@ -1,11 +1,12 @@
 //! Single relay with an upload, and the ground station with its answers.
 
 use host_tests::bench;
+use host_tests::make;
 use uav_relay::MAX_FRAME;
 use uav_relay::UploadError;
 use uav_relay::ground::Progress;
 use uav_relay::{
-    Auth, Event, Field, FieldPoint, Ground, Identity, Key, Port, Relay, Settings, ViewId, Wiring,
+    Auth, Event, Field, FieldPoint, Ground, Identity, Port, Relay, Settings, ViewId, Wiring,
 };
 
 use super::*;
@@ -21,16 +22,10 @@ static POINTS: [FieldPoint; 2] = [
     },
 ];
 
-const IDENTITY: Identity = Identity {
-    network: 7,
-    index: 1,
-};
+const IDENTITY: Identity = make::identity(1);
 
 fn auth(epoch: u32) -> Auth {
-    Auth {
-        key: Key::new([7; 32]),
-        epoch,
-    }
+    make::auth([7; 32], epoch)
 }
 
 fn settings(wiring: Wiring) -> Settings {
@@ -247,10 +242,7 @@ type Counter = fn(&Relay) -> u32;
 fn a_ground_of_another_key_network_or_mission_is_ignored() {
     let base = mission(1);
     let other = Mission::try_new(moved(&base, 1.0, 2.0)).unwrap();
-    let stranger = Auth {
-        key: Key::new([8; 32]),
-        epoch: 1,
-    };
+    let stranger = make::auth([8; 32], 1);
     let grounds: Vec<(Ground, Mission, Counter)> = vec![
         (
             Ground::new(&base, Side::Upstream, 7, Wiring::Pair, stranger),

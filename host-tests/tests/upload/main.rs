@@ -15,7 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use host_tests::fixtures::mission;
 use host_tests::flights::{bad_day, eight_apart, own_profiles, seconds};
 use host_tests::ledger::{self, left};
-use uav_relay::{Instant, Interference, Interferer, Mission, MissionConfig, Side, Upload};
+use host_tests::make;
+use uav_relay::{Instant, Interference, Mission, MissionConfig, Side, Upload};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::{Setup, UploadSpec};
@@ -23,11 +24,7 @@ use uav_relay_sim::simulator::setup::{Setup, UploadSpec};
 /// Returns the mission `base` with its interferer at (`x_m`, `y_m`).
 fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
     MissionConfig {
-        interference: Interference::Source(Interferer {
-            power_w: 80.0,
-            x_m,
-            y_m,
-        }),
+        interference: Interference::Source(make::interferer(80.0, x_m, y_m)),
         ..*base.config()
     }
 }

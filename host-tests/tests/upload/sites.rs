@@ -1,7 +1,8 @@
 //! Uploads that move the receiver: adopted by all relays or none, in spite of losses and reboots.
 
+use host_tests::make;
 use uav_relay::flight::axis::Axis;
-use uav_relay::{Placement, Sites, Wiring};
+use uav_relay::{Sites, Wiring};
 use uav_relay_sim::simulator::fleet::somewhere;
 
 use super::*;
@@ -12,11 +13,7 @@ fn ends(base: &Mission, on_m: f32, right_m: f32) -> Sites {
     let distance_m = base.config().distance_m;
     let axis = somewhere(f64::from(distance_m)).unwrap();
     let at = |x_m, y_m| {
-        let place = Placement {
-            x_m,
-            y_m,
-            altitude_m: 0.0,
-        };
+        let place = make::placement(x_m, y_m, 0.0);
         axis.point(place).unwrap()
     };
     Sites {

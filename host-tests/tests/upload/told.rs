@@ -2,6 +2,7 @@
 
 use chacha20::ChaCha8Rng;
 use host_tests::ledger::number;
+use host_tests::make;
 use rand::{RngExt as _, SeedableRng as _};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use uav_relay::GuardConfig;
@@ -130,15 +131,9 @@ fn report_positions(wires: &mut Wires, base: &Mission) {
 
 #[test]
 fn an_upload_outside_the_geofence_is_refused_and_reported() {
-    let wide = Band {
-        least_m: 50.0,
-        most_m: 150.0,
-    };
+    let wide = make::band(50.0, 150.0);
     let aside = |base: &Mission| MissionConfig {
-        lateral: Band {
-            least_m: -20.0,
-            most_m: 0.0,
-        },
+        lateral: make::band(-20.0, 0.0),
         ..*base.config()
     };
     let longer = |base: &Mission| MissionConfig {

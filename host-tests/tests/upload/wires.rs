@@ -5,9 +5,10 @@ use std::rc::Rc;
 
 use chacha20::ChaCha8Rng;
 use host_tests::bench::Bench;
+use host_tests::make;
 use rand::{RngExt as _, SeedableRng as _};
 use uav_relay::ground::Progress;
-use uav_relay::{Auth, Duration, Event, FlownMission, Identity, Key, Placement, Relay, Settings};
+use uav_relay::{Auth, Duration, Event, FlownMission, Identity, Placement, Relay, Settings};
 
 use super::*;
 
@@ -17,10 +18,7 @@ const TURN: Duration = Duration::from_millis(5);
 /// Largest distance that a drone flies along each axis in one interval (`TURN`), m.
 const MOST_M: f32 = 0.05;
 
-const AUTH: Auth = Auth {
-    key: Key::new([7; 32]),
-    epoch: 1,
-};
+const AUTH: Auth = make::auth([7; 32], 1);
 
 /// Chain of relays on lossy wires, with ground stations.
 pub(crate) struct Wires {
@@ -114,11 +112,11 @@ impl Wires {
         for (relay, place) in self.bench.relays.iter_mut().zip(&mut self.places) {
             let to = relay.setpoint().unwrap_or(*place);
             let step = |is: f32, to: f32| is + (to - is).clamp(-MOST_M, MOST_M);
-            *place = Placement {
-                x_m: step(place.x_m, to.x_m),
-                y_m: step(place.y_m, to.y_m),
-                altitude_m: step(place.altitude_m, to.altitude_m),
-            };
+            *place = make::placement(
+                step(place.x_m, to.x_m),
+                step(place.y_m, to.y_m),
+                step(place.altitude_m, to.altitude_m),
+            );
             relay.handle_position(now, *place, now);
         }
     }

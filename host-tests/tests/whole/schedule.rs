@@ -1,6 +1,7 @@
 //! Random schedules that mix all faults.
 
 use chacha20::ChaCha8Rng;
+use host_tests::make;
 use rand::{RngExt, SeedableRng};
 use uav_relay::{Interference, Interferer, Upload, Wiring};
 
@@ -260,11 +261,11 @@ fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
     let base = &schedule.kind.mission;
     let mut config = *base.config();
     if let Interference::Source(Interferer { power_w, .. }) = config.interference {
-        config.interference = Interference::Source(Interferer {
+        config.interference = Interference::Source(make::interferer(
             power_w,
-            x_m: rng.random_range(100.0..900.0),
-            y_m: rng.random_range(100.0..500.0),
-        });
+            rng.random_range(100.0..900.0),
+            rng.random_range(100.0..500.0),
+        ));
     }
     Box::new(Upload::new(base, 1, config).unwrap())
 }

@@ -3,12 +3,13 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
-use host_tests::fixtures::{NETWORK, paper};
+use host_tests::fixtures::paper;
+use host_tests::make;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use serde_json::json;
-use uav_relay::wire::frame::{Header, MAX_FRAME};
+use uav_relay::wire::frame::MAX_FRAME;
 use uav_relay::{Interference, MissionConfig, Port, ViewId, Wiring};
 use uav_relay_decode::envelope::unsigned;
 
@@ -334,12 +335,7 @@ fn a_relays_frames_have_its_header_and_a_rising_counter() {
         while let Some(transmit) = head.poll_transmit(now, &mut buffer) {
             let plain = plain_of(&buffer[..transmit.len]);
             let message = WireMessage::read(&plain[10..plain.len() - 4]).unwrap();
-            let header = Header {
-                network: NETWORK,
-                sender: 1,
-                destination: 2,
-                counter,
-            };
+            let header = make::header(1, 2, counter);
             assert_eq!(plain, unsigned(header, message.body()), "frame {counter}");
             if message.is("Sweep") {
                 assert_eq!(message.number("view_digest"), f64::from(head.mission));

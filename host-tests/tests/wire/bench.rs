@@ -4,8 +4,9 @@ use std::iter;
 use std::ops::{Deref, DerefMut};
 
 use host_tests::fixtures::{self, NETWORK, paper};
+use host_tests::make;
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::frame::{self, Header, MAX_FRAME};
+use uav_relay::wire::frame::{self, MAX_FRAME};
 use uav_relay::{
     Duration, Event, Instant, Mission, MissionConfig, Port, Relay, Settings, Stats, Wiring,
 };
@@ -150,12 +151,7 @@ pub(crate) fn events(relay: &mut Relay) -> Vec<Event> {
 
 /// Encodes a message of node `sender` to node `destination` as a frame on the wire.
 pub(crate) fn frame_between(sender: u16, destination: u16, message: &WireMessage) -> Vec<u8> {
-    let header = Header {
-        network: NETWORK,
-        sender,
-        destination,
-        counter: 0,
-    };
+    let header = make::header(sender, destination, 0);
     wire(header, message.body())
 }
 

@@ -1,8 +1,9 @@
 //! Claims to a node number without a key, and frames with a relay's own number under a key.
 
 use host_tests::fixtures::paper;
+use host_tests::make;
 use uav_relay::MAX_FRAME;
-use uav_relay::{Auth, Duration, Event, Instant, Key, Mission, Port, Relay, Settings, Wiring};
+use uav_relay::{Duration, Event, Instant, Mission, Port, Relay, Settings, Wiring};
 
 use super::bench::{Bench, frame_between};
 use super::kinds::{FIRST, claim, one_of_each};
@@ -125,16 +126,10 @@ fn frames(relay: &mut Relay) -> Vec<Vec<u8>> {
 fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     let settings = Settings {
         wiring: Wiring::Shared,
-        auth: Some(Auth {
-            key: Key::new([key; 32]),
-            epoch: 3,
-        }),
+        auth: Some(make::auth([key; 32], 3)),
         ..Settings::default()
     };
-    let identity = uav_relay::Identity {
-        network: 7,
-        index: 4,
-    };
+    let identity = make::identity(4);
     let mission = Mission::try_new(paper(8)).unwrap();
     let mut relay = Relay::new(mission, identity, settings, seed, NOW).unwrap();
     let frames = frames(&mut relay);

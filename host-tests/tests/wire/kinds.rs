@@ -1,8 +1,9 @@
 //! Messages of each kind, and missions in which a relay receives them.
 
 use host_tests::fixtures::paper;
+use host_tests::make;
 use serde_json::json;
-use uav_relay::{Band, Field, FieldPoint, Interference, MissionConfig, Port, Wiring};
+use uav_relay::{Field, FieldPoint, Interference, MissionConfig, Port, Wiring};
 
 use super::bench::Bench;
 use super::message::WireMessage;
@@ -32,14 +33,8 @@ pub(crate) const SECOND: u16 = 65;
 pub(crate) fn mission(interference: Interference) -> MissionConfig {
     MissionConfig {
         interference,
-        band: Band {
-            least_m: 20.0,
-            most_m: 300.0,
-        },
-        lateral: Band {
-            least_m: -60.0,
-            most_m: 40.0,
-        },
+        band: make::band(20.0, 300.0),
+        lateral: make::band(-60.0, 40.0),
         ..paper(8)
     }
 }

@@ -1,5 +1,6 @@
 //! Meaning of the fields: the crate's message, made from a body without the crate's decoder.
 
+use host_tests::make;
 use uav_relay::guard::Fence;
 use uav_relay::optimiser::PerTarget;
 use uav_relay::optimiser::ladder::Ladder;
@@ -12,9 +13,7 @@ use uav_relay::wire::message::{
     OwnSeat, Poll, Proposal, Pulse, Pulsed, Reports, Requests, Roster, Successor, Sweep,
     SweepVerdict, Token,
 };
-use uav_relay::{
-    Band, Interference, Interferer, Local, Placement, Profile, Sites, Upload, View, ViewId,
-};
+use uav_relay::{Interference, Local, Placement, Sites, Upload, View, ViewId};
 use uav_relay_decode::value::{Fields, Value};
 
 use super::message::{WireMessage, list, number};
@@ -341,18 +340,12 @@ fn vote(name: &str, of: &MessageFields<'_>) -> Message {
 fn upload(wire_message: &WireMessage, of: &MessageFields<'_>) -> Upload {
     let upload = Upload::decode(&offer::kept(wire_message)).unwrap();
     let config = upload.config();
-    let band = |least, most| Band {
-        least_m: of.real(least),
-        most_m: of.real(most),
-    };
+    let band = |least, most| make::band(of.real(least), of.real(most));
     assert_eq!(
         (upload.version(), upload.base(), config.relays),
         (of.word("version"), of.word("base"), of.word("relays"))
     );
-    let common = Profile {
-        altitude_m: of.real("altitude_m"),
-        power_w: of.real("power_w"),
-    };
+    let common = make::profile(of.real("altitude_m"), of.real("power_w"));
     assert_eq!(config.common, common);
     let numbers = [
         ("distance_m", config.distance_m),
@@ -367,11 +360,11 @@ fn upload(wire_message: &WireMessage, of: &MessageFields<'_>) -> Upload {
     for (name, number) in numbers {
         assert_eq!(number, of.real(name), "{name}");
     }
-    let interferer = Interferer {
-        power_w: of.real("interferer_power_w"),
-        x_m: of.real("interferer_x_m"),
-        y_m: of.real("interferer_y_m"),
-    };
+    let interferer = make::interferer(
+        of.real("interferer_power_w"),
+        of.real("interferer_x_m"),
+        of.real("interferer_y_m"),
+    );
     let interference = if interferer.power_w == 0.0 {
         Interference::Unknown
     } else {
@@ -411,11 +404,11 @@ fn sense(wire_message: &WireMessage, of: &MessageFields<'_>) -> Message {
         2 => InterferenceEstimate::Unknown(Spread::TowardTx),
         3 => InterferenceEstimate::Unknown(Spread::TowardRx),
         _ => InterferenceEstimate::Source {
-            source: Interferer {
-                power_w: of.real("source_power_w"),
-                x_m: of.real("source_x_m"),
-                y_m: of.real("source_y_m"),
-            },
+            source: make::interferer(
+                of.real("source_power_w"),
+                of.real("source_x_m"),
+                of.real("source_y_m"),
+            ),
             receiver_w: of.real("source_at_rx_w"),
         },
     };

@@ -1,11 +1,12 @@
 //! Offers whose relays do or do not fit on the line, and the encoding of an operator's upload.
 
 use host_tests::fixtures::paper;
+use host_tests::make;
 use serde_json::json;
 use uav_relay::channel::AirGround;
 use uav_relay::wire::digest::digest;
 use uav_relay::wire::message::{Message, MessageError};
-use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile, Upload};
+use uav_relay::{Channel, Interference, Mission, MissionConfig, Upload};
 
 use uav_relay_decode::write;
 
@@ -62,24 +63,11 @@ fn other(channel: Channel) -> MissionConfig {
         distance_m: 1100.0,
         min_separation_m: 5.0,
         tx_power_w: 70.0,
-        common: Profile {
-            altitude_m: 30.0,
-            power_w: 2.0,
-        },
+        common: make::profile(30.0, 2.0),
         channel,
-        band: Band {
-            least_m: 25.0,
-            most_m: 250.0,
-        },
-        lateral: Band {
-            least_m: -35.0,
-            most_m: 45.0,
-        },
-        interference: Interference::Source(Interferer {
-            power_w: 60.0,
-            x_m: 700.0,
-            y_m: -300.0,
-        }),
+        band: make::band(25.0, 250.0),
+        lateral: make::band(-35.0, 45.0),
+        interference: Interference::Source(make::interferer(60.0, 700.0, -300.0)),
         noise_w: 1e-12,
         reverse: 0.25,
         rx_power_w: 5.0,

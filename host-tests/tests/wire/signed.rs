@@ -5,12 +5,12 @@ use std::ops::{Deref, DerefMut};
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
 use blake2::digest::{FixedOutput, Mac};
-use host_tests::fixtures::{self, NETWORK, paper};
+use host_tests::fixtures::{self, paper};
+use host_tests::make;
 use serde_json::json;
 use uav_relay::MAX_FRAME;
-use uav_relay::wire::auth::{Auth, Key, TAG};
+use uav_relay::wire::auth::TAG;
 use uav_relay::wire::digest::digest;
-use uav_relay::wire::frame::Header;
 use uav_relay::{Duration, Event, Instant, Mission, Port, Relay, Settings, Upload, Wiring};
 use uav_relay_decode::envelope::{before, sealed, stuffed};
 
@@ -31,10 +31,7 @@ const HANDSHAKE: u16 = 2;
 pub(crate) fn settings(wiring: Wiring) -> Settings {
     Settings {
         wiring,
-        auth: Some(Auth {
-            key: Key::new(KEY),
-            epoch: 9,
-        }),
+        auth: Some(make::auth(KEY, 9)),
         ..Settings::default()
     }
 }
@@ -229,12 +226,7 @@ impl Peer {
     }
 
     fn frame(&mut self, flags: u16, body: &[u8]) -> Vec<u8> {
-        let header = Header {
-            network: NETWORK,
-            sender: self.node,
-            destination: self.relay,
-            counter: self.counter,
-        };
+        let header = make::header(self.node, self.relay, self.counter);
         self.counter += 1;
         let mut bytes = before(header, flags, body);
         let mut mac = Blake2sMac::<U8>::new_from_slice(&KEY).unwrap();

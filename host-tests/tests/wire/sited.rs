@@ -1,10 +1,11 @@
 //! Uploads with sites: refusals, the sites in use, and separation of positions along different lines.
 
 use host_tests::fixtures::paper;
+use host_tests::make;
 use serde_json::json;
 use uav_relay::{
-    Duration, Event, Geodetic, Geofence, GuardConfig, Instant, LineError, Mission, MissionConfig,
-    Placement, Settings, Sites, Upload, UploadError, Wiring,
+    Duration, Event, Geofence, GuardConfig, Instant, LineError, Mission, MissionConfig, Placement,
+    Settings, Sites, Upload, UploadError, Wiring,
 };
 
 use super::adopted::adopts;
@@ -27,11 +28,7 @@ const A_KILOMETRE: [i32; 6] = [
 ];
 
 fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
-    let at = |lat_e7, lon_e7, amsl_mm| Geodetic {
-        lat_e7,
-        lon_e7,
-        amsl_mm,
-    };
+    let at = |lat_e7, lon_e7, amsl_mm| make::geodetic(lat_e7, lon_e7, amsl_mm);
     Sites {
         tx: at(a, b, c),
         rx: at(d, e, f),

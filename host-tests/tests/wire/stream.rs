@@ -155,34 +155,6 @@ fn the_longest_frame_fits_and_one_byte_more_does_not() {
     }
 }
 
-#[test]
-fn the_delimiter_after_a_bad_frame_begins_a_good_one() {
-    let vector = &vectors().frames[0];
-    let good = &vector.wire;
-    for bad in [
-        vec![5, 1, 0],
-        vec![0xFF, 0],
-        [vec![0x64; 300], vec![0]].concat(),
-        [vec![0xFF; 5000], vec![0]].concat(),
-        [&good[..14], &[0]].concat(),
-    ] {
-        let outcomes = deframed(&[&bad[..], good].concat());
-        assert_eq!(outcomes.len(), 2);
-        assert!(outcomes[0].is_err());
-        assert_eq!(outcomes[1], Ok(vector.plain.clone()));
-    }
-}
-
-#[test]
-fn empty_frames_are_ignored() {
-    assert_eq!(deframed(&[0; 1000]), []);
-    let vector = &vectors().frames[0];
-    let stream = [&[0, 0, 0][..], &vector.wire, &[0, 0]].concat();
-    assert_eq!(deframed(&stream), [Ok(vector.plain.clone())]);
-    // A lone code byte is a frame without bytes, which counts as too short.
-    assert_eq!(deframed(&[1, 0]), [Ok(vec![])]);
-}
-
 /// Draws streams of pieces of frames, or of random bytes. One in 64 of the random bytes is a delimiter, and half of
 /// the random bytes are small, so that the stream has short runs and frequent zeros.
 fn streams() -> impl Strategy<Value = Vec<u8>> {

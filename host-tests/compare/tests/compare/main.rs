@@ -215,42 +215,31 @@ fn chosen_altitudes_count_in_the_sir() {
 #[test]
 fn an_invalid_chain_does_not_count() {
     let (sir, best) = best_of_eight();
-    let broken = |change: &dyn Fn(&mut Vec<[f64; 3]>)| {
+    let line_of = |chain: &[[f64; 3]]| line_of_rival(run("rival", 1.0, sir, chain));
+    let moved = |relay: usize, axis: usize, to_m: f64| {
         let mut chain = best.clone();
-        change(&mut chain);
-        line_of_rival(run("rival", 1.0, sir, &chain))
+        chain[relay - 1][axis] = to_m;
+        line_of(&chain)
     };
+    let mut swapped = best.clone();
+    swapped.swap(2, 3);
+    let near_m = |apart_m: f64| best[5][0] - apart_m;
     for (line, reason) in [
-        (broken(&|chain| _ = chain.pop()), "it has 7 relays"),
+        (line_of(&best[..7]), "it has 7 relays"),
+        (moved(1, 0, -0.5), "relay 1 is at x = -0.5 m"),
+        (moved(8, 0, 1000.5), "relay 8 is at x = 1000.5 m"),
+        (moved(5, 2, 20.5), "relay 5 is at h = 20.5 m"),
+        (moved(6, 1, -0.5), "relay 6 is at y = -0.5 m"),
+        (line_of(&swapped), "relay 4 is behind the one before it"),
         (
-            broken(&|chain| chain[0][0] = -0.5),
-            "relay 1 is at x = -0.5 m",
-        ),
-        (
-            broken(&|chain| chain[7][0] = 1000.5),
-            "relay 8 is at x = 1000.5 m",
-        ),
-        (
-            broken(&|chain| chain[4][2] = 20.5),
-            "relay 5 is at h = 20.5 m",
-        ),
-        (
-            broken(&|chain| chain[5][1] = -0.5),
-            "relay 6 is at y = -0.5 m",
-        ),
-        (
-            broken(&|chain| chain.swap(2, 3)),
-            "relay 4 is behind the one before it",
-        ),
-        (
-            broken(&|chain| chain[4][0] = chain[5][0] - 3.99),
+            moved(5, 0, near_m(3.99)),
             "relay 6 is 3.990 m from the one before it",
         ),
     ] {
         assert_eq!(line, format!("does not count: {reason} | | | | | | |"));
     }
     // Rounding to f32 is permitted.
-    let line = broken(&|chain| chain[4][0] = chain[5][0] - 3.9995);
+    let line = moved(5, 0, near_m(3.9995));
     assert!(!line.contains("m from the one before it"), "{line}");
 }
 

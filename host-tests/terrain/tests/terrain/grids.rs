@@ -138,51 +138,33 @@ fn utm_grids_have_the_heights_of_an_independent_projection() {
 }
 
 #[test]
-#[expect(clippy::too_many_lines, reason = "a list of files and their errors")]
 fn unusable_files_and_places_are_named() {
     let folder = folder();
     let file = |name: &str| folder.path().join(name);
     let cell = 1.0 / 3600.0;
     let geographic = || Raster::geographic(8.0, 47.1, cell, [360, 361]);
     geographic().write(&file("a.tif"), plane);
-    Raster {
-        size: [180, 180],
-        ..Raster::geographic(8.1, 47.1, 2.0 * cell, [180, 180])
-    }
-    .write(&file("coarse.tif"), plane);
+    Raster::geographic(8.1, 47.1, 2.0 * cell, [180, 180]).write(&file("coarse.tif"), plane);
     Raster::geographic(8.1 + 0.3 * cell, 47.1, cell, [90, 90]).write(&file("shifted.tif"), plane);
-    Raster {
-        epsg: 32632,
-        corner: [4.6e5, 5.25e6],
-        cell: [30.0; 2],
-        ..geographic()
-    }
-    .write(&file("utm.tif"), |_, _| 1.0);
-    Raster {
-        epsg: 2056,
-        corner: [2.6e6, 1.2e6],
-        cell: [30.0; 2],
-        ..geographic()
-    }
-    .write(&file("swiss.tif"), |_, _| 1.0);
-    for (name, metadata) in [
-        (
-            "decimetres.tif",
-            r#"<Item name="SCALE" sample="0" role="scale">0.1</Item>"#,
-        ),
-        (
-            "feet.tif",
-            r#"<Item name="UNITTYPE" sample="0" role="unittype">ft</Item>"#,
-        ),
-        (
-            "quotes.tif",
-            "<Item name='UNITTYPE' sample='0' role='unittype'>US survey foot</Item>",
-        ),
-        (
-            "meter.tif",
-            r#"<Item name="UNITTYPE" sample="0" role="unittype">Meter</Item>"#,
-        ),
+    for (name, epsg, corner) in [
+        ("utm.tif", 32632, [4.6e5, 5.25e6]),
+        ("swiss.tif", 2056, [2.6e6, 1.2e6]),
     ] {
+        Raster {
+            epsg,
+            corner,
+            cell: [30.0; 2],
+            ..geographic()
+        }
+        .write(&file(name), |_, _| 1.0);
+    }
+    for row in [
+        r#"decimetres.tif <Item name="SCALE" sample="0" role="scale">0.1</Item>"#,
+        r#"feet.tif <Item name="UNITTYPE" sample="0" role="unittype">ft</Item>"#,
+        "quotes.tif <Item name='UNITTYPE' sample='0' role='unittype'>US survey foot</Item>",
+        r#"meter.tif <Item name="UNITTYPE" sample="0" role="unittype">Meter</Item>"#,
+    ] {
+        let (name, metadata) = row.split_once(' ').unwrap();
         Raster {
             metadata: Some(metadata),
             ..geographic()
@@ -207,78 +189,31 @@ fn unusable_files_and_places_are_named() {
     std::fs::write(file("N47E008.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("zurich.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("text.tif"), "no picture").unwrap();
-    let load = |names: &[&str]| {
-        let files: Vec<_> = names.iter().map(|name| file(name)).collect();
-        Terrain::load(&files)
-            .err()
-            .unwrap_or_else(|| panic!("{names:?}"))
+    let load = |names: &str| {
+        let files: Vec<_> = names.split(' ').map(file).collect();
+        let refused = Terrain::load(&files).err();
+        refused.unwrap_or_else(|| panic!("{names}"))
     };
-    for (names, parts) in [
-        (
-            &["missing.tif"] as &[&str],
-            &["missing.tif: No such file"] as &[&str],
-        ),
-        (&["text.tif"], &["text.tif: "]),
-        (
-            &["N47E008.hgt"],
-            &["N47E008.hgt: has 1000 bytes; allowed: 2 bytes for each of 1201 x 1201"],
-        ),
-        (&["zurich.hgt"], &["zurich.hgt: its name must begin with"]),
-        (
-            &["decimetres.tif"],
-            &[
-                "decimetres.tif: has heights with the scale 0.1 (tag 42112); allowed: heights in metres, without scale or offset",
-            ],
-        ),
-        (
-            &["feet.tif"],
-            &[
-                "feet.tif: has heights with the unittype ft (tag 42112); allowed: heights in metres, without scale or offset",
-            ],
-        ),
-        (
-            &["quotes.tif"],
-            &["quotes.tif: has heights with the unittype US survey foot (tag 42112)"],
-        ),
-        (
-            &["swiss.tif"],
-            &["swiss.tif: has the EPSG code 2056; allowed: 4326"],
-        ),
-        (
-            &["a.tif", "utm.tif"],
-            &[
-                "utm.tif: its coordinate system, UTM zone 32N, differs from that of ",
-                "a.tif (latitude and longitude, cells of 0.000277",
-            ],
-        ),
-        (
-            &["survey.tif"],
-            &[
-                "survey.tif: has heights in feet: its vertical coordinate system is EPSG 6360 (key 4096); allowed: heights in metres",
-            ],
-        ),
-        (
-            &["ellipsoid.tif"],
-            &[
-                "ellipsoid.tif: has heights above the ellipsoid",
-                "code 5030 (key 4096)",
-            ],
-        ),
-        (
-            &["a.tif", "coarse.tif"],
-            &["coarse.tif: its cell size, 0.000555"],
-        ),
-        (
-            &["a.tif", "shifted.tif"],
-            &[
-                "shifted.tif: its origin, 8.100083",
-                "is not at a grid point of the other file",
-            ],
-        ),
+    // The files, and parts of the error line.
+    for row in [
+        "missing.tif | missing.tif: No such file",
+        "text.tif | text.tif: ",
+        "N47E008.hgt | N47E008.hgt: has 1000 bytes; allowed: 2 bytes for each of 1201 x 1201",
+        "zurich.hgt | zurich.hgt: its name must begin with",
+        "decimetres.tif | decimetres.tif: has heights with the scale 0.1 (tag 42112); allowed: heights in metres, without scale or offset",
+        "feet.tif | feet.tif: has heights with the unittype ft (tag 42112); allowed: heights in metres, without scale or offset",
+        "quotes.tif | quotes.tif: has heights with the unittype US survey foot (tag 42112)",
+        "swiss.tif | swiss.tif: has the EPSG code 2056; allowed: 4326",
+        "a.tif utm.tif | utm.tif: its coordinate system, UTM zone 32N, differs from that of  | a.tif (latitude and longitude, cells of 0.000277",
+        "survey.tif | survey.tif: has heights in feet: its vertical coordinate system is EPSG 6360 (key 4096); allowed: heights in metres",
+        "ellipsoid.tif | ellipsoid.tif: has heights above the ellipsoid | code 5030 (key 4096)",
+        "a.tif coarse.tif | coarse.tif: its cell size, 0.000555",
+        "a.tif shifted.tif | shifted.tif: its origin, 8.100083 | is not at a grid point of the other file",
     ] {
+        let (names, parts) = row.split_once(" | ").unwrap();
         let line = load(names);
-        for part in parts {
-            assert!(line.contains(part), "{names:?}: {line}: {part}");
+        for part in parts.split(" | ") {
+            assert!(line.contains(part), "{row}: {line}: {part}");
         }
     }
 }

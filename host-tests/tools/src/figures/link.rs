@@ -11,7 +11,7 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use crate::plan::carried::Carried;
 use crate::plan::rate::Rate;
-use crate::plan::{Number, Plan, PlanRequest, plan};
+use crate::plan::{Plan, PlanRequest, plan};
 
 /// Largest number of relays in the figure, which has all numbers from 1 up to this one.
 pub const MOST_RELAYS: u16 = 24;
@@ -43,12 +43,7 @@ struct Row {
 }
 
 const fn ask(relays: u16) -> PlanRequest {
-    PlanRequest {
-        number: Number::Of(relays),
-        free_altitude: false,
-        x_m: None,
-        tolerance: 1e-4,
-    }
+    PlanRequest::of(relays, false, 1e-4)
 }
 
 fn planned(plan: Result<Plan, crate::plan::NoPlan>) -> Result<Plan, FigureError> {

@@ -243,7 +243,7 @@ fn possible(here: &Node<'_>, other: &Node<'_>) -> Vec<bool> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::{Targets, excludes};
-    use crate::plan::{Number, PlanRequest, plan};
+    use crate::plan::{PlanRequest, plan};
     use uav_relay_scenario::Scenario;
     use uav_relay_scenario::scene::Scene;
 
@@ -256,12 +256,7 @@ mod tests {
         };
         for (relays, reverse) in [(1, 0.0), (3, 0.0), (8, 0.0), (20, 0.0), (3, 1.0), (8, 0.3)] {
             scenario.reverse = reverse;
-            let ask = PlanRequest {
-                number: Number::Of(relays),
-                free_altitude: false,
-                x_m: None,
-                tolerance: 1e-5,
-            };
+            let ask = PlanRequest::of(relays, false, 1e-5);
             let best = plan(&scenario, &ask).unwrap().sir();
             let scene = Scene::new(&scenario, relays).unwrap();
             let excluded = |share: f64| {

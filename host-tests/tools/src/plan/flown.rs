@@ -12,7 +12,7 @@ use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Scenario, mission};
 
 use super::multi_interferer::with_one;
-use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, fitted_radio, merit, source};
+use super::{LOSS, NoPlan, Plan, PlanRequest, altitude, fitted_radio, merit, source};
 
 /// Positions that the relays would agree on in flight, compared with the best positions found.
 #[derive(Clone, PartialEq, Debug)]
@@ -91,12 +91,7 @@ pub fn flown(
     tolerance: f64,
 ) -> Result<Flown, NoPlan> {
     let plan = alone(scenario, relays, method, tolerance)?;
-    let ask = PlanRequest {
-        number: Number::Of(relays),
-        free_altitude: method == PlannedMethod::Joint,
-        x_m: None,
-        tolerance,
-    };
+    let ask = PlanRequest::of(relays, method == PlannedMethod::Joint, tolerance);
     let best = super::plan(&super::area::anywhere(scenario), &ask)?;
     let best_sir = best.sir().max(plan.sir());
     let radio = fitted_radio(scenario, ask.free_altitude);

@@ -142,6 +142,18 @@ pub struct PlanRequest {
     pub tolerance: f64,
 }
 
+impl PlanRequest {
+    /// Creates a request for `relays` relays at the best x.
+    pub const fn of(relays: u16, free_altitude: bool, tolerance: f64) -> Self {
+        Self {
+            number: Number::Of(relays),
+            free_altitude,
+            x_m: None,
+            tolerance,
+        }
+    }
+}
+
 /// Largest accepted loss of SIR or data rate, as a fraction of its value at the best positions.
 pub const LOSS: f64 = 0.01;
 

@@ -23,7 +23,7 @@ use uav_relay_terrain::diffraction::{LIGHT_M_S, Point, loss_db};
 use uav_relay_terrain::profile::{Ground, Node, bulge_m};
 
 use super::terrain::Elevation;
-use super::{NoPlan, Number, Plan, PlanRequest, Why, area};
+use super::{NoPlan, Plan, PlanRequest, Why, area};
 
 /// Largest number of relays in a search over terrain.
 pub const MOST_RELAYS: u16 = 50;
@@ -604,12 +604,7 @@ pub fn best(
     let columns = u32::from(relays * 8).max(80);
     // The positions that ignore the terrain are candidates, raised if necessary, so that the search does no worse.
     let mut seeds = vec![Vec::new(); usize::from(relays)];
-    let ask = PlanRequest {
-        number: Number::Of(relays),
-        free_altitude: true,
-        x_m: None,
-        tolerance,
-    };
+    let ask = PlanRequest::of(relays, true, tolerance);
     if let Ok(blind) = super::plan(scenario, &ask) {
         for ((relay, seeds), (place, _)) in seeds.iter_mut().enumerate().zip(&blind.places) {
             let own_m = f64::from(place.altitude_m);
