@@ -134,7 +134,7 @@ pub struct Guard {
     disorder: bool,
     /// Number of successive reminders (calls of `remind`, one per second) with an unknown order along x.
     unordered: u8,
-    /// Number of successive reminders (calls of `remind`, one per second) while this relay waits for a message.
+    /// Number of successive reminders (one per second) while this relay waits for a message.
     waited: u8,
     /// Quarters of a second that reminders have counted.
     reminders: u8,
@@ -144,7 +144,7 @@ pub struct Guard {
 /// Quarters of a second between two messages of a relay that hovers without flying to setpoints.
 const UNFLOWN_EVERY: u8 = 16;
 
-/// Number of seconds of waiting for a neighbour's message after which messages are no longer repeated early.
+/// Number of seconds without the awaited message after which messages are no longer repeated early.
 const MAX_EARLY: u8 = 30;
 
 /// Number of seconds after which an unknown order along x halts the chain.

@@ -183,7 +183,7 @@ impl Deployment {
         Some(FleetSize { relays, flying })
     }
 
-    /// Returns the error `problem` of the key `fleet.flying`, or of `network.relays` if `fleet.flying` is not given.
+    /// Returns the error `problem` of the key `fleet.flying`, or of `network.relays` without that key.
     fn size_error(&self, file: &str, problem: Problem, allowed: String) -> ScenarioError {
         let (key, value) = match self.fleet.flying {
             Some(flying) => ("fleet.flying", Some(flying)),

@@ -15,7 +15,7 @@ use uav_relay_screen::{
     Task,
 };
 
-/// Time within which 99 % of the calls of `Screen::show` have to return; of fewer than [`MANY`] calls, half of them.
+/// Time within which 99 % of the calls of `Screen::show` return, or half of fewer than [`MANY`] calls.
 ///
 /// The others may be late, because a busy machine may take the processor away at any time.
 const SHOW_TIME: Duration = Duration::from_millis(1);

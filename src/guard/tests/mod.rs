@@ -559,7 +559,7 @@ fn a_relay_that_waits_repeats_its_messages_early() {
     }
 }
 
-/// Checks that a relay whose fence is never answered repeats it early for a limited time, also in a known order.
+/// Checks that a relay whose fence is never answered repeats it early only for a limited time.
 #[test]
 fn a_relay_that_waits_in_vain_repeats_its_messages_less_often() {
     let mut pair = Pair::new([100.0, 120.0], [300.0, 300.0]);

@@ -37,7 +37,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns the options, with `--uavs` from `fleet.flying` of the scenario if the request names neither number nor target.
+/// Returns the options, with `--uavs` from the scenario's `fleet.flying`.
+///
+/// The scenario's number counts only if the request has neither `--uavs` nor a target.
 fn settled(mut options: Options) -> Result<Options, Failure> {
     let Wanted {
         uavs,

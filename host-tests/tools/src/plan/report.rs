@@ -314,7 +314,7 @@ pub struct FleetReport {
 }
 
 impl FleetReport {
-    /// Creates the report; `None` without spares, or if `planned`, the number of planned relays, is not the chain's.
+    /// Creates the report; `None` without spares, or if the chain has not `planned` relays.
     pub fn new(size: Option<FleetSize>, planned: u16) -> Option<Self> {
         let FleetSize { relays, flying } =
             size.filter(|it| it.flying == planned && it.flying < it.relays)?;

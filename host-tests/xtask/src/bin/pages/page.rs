@@ -264,7 +264,7 @@ fn functions(config: &str, bin: &Path, root: &Path) -> String {
 pub(crate) struct Difference {
     /// Line of the page.
     pub line: String,
-    /// Most similar line of the output after the lines found before; empty if there is none.
+    /// The most similar line of the output after the lines found before; empty if there is none.
     pub like: String,
 }
 
@@ -275,9 +275,9 @@ impl fmt::Display for Difference {
     }
 }
 
-/// Returns the lines of the page that do not occur in the output, in order, with other lines in between.
+/// Returns the lines of the page that do not occur in the output in this order.
 ///
-/// If `noisy` is true, each number matches any number. After a line that does not occur, the search goes on after the
+/// Other lines may stand in between. If `noisy` is true, each number matches any number. After a line that does not occur, the search goes on after the
 /// most similar line.
 pub(crate) fn differences(page: &[&str], output: &str, noisy: bool) -> Vec<Difference> {
     let read = |line: &str| {
@@ -314,7 +314,7 @@ pub(crate) fn differences(page: &[&str], output: &str, noisy: bool) -> Vec<Diffe
     found
 }
 
-/// Returns the page `text` with the first equal line after line `from` replaced by the similar line of the output.
+/// Returns the page `text` with the different line, sought after line `from`, replaced by the output's.
 pub(crate) fn corrected(text: &str, from: usize, difference: &Difference) -> String {
     let mut lines: Vec<&str> = text.split('\n').collect();
     let after = lines.iter_mut().skip(from);
