@@ -496,36 +496,6 @@ fn one_of_two_spares_in_a_gap_is_called() {
     }
 }
 
-/// Checks that a spare that receives nothing does not keep another spare out of the chain.
-#[test]
-fn a_spare_that_receives_nothing_is_not_called() {
-    for (flying, leaver) in [(8, Some(2)), (8, None), (0, Some(7))] {
-        for (deaf, able) in [(5, 6), (6, 5)] {
-            let leaves: Vec<_> = leaver.map(|relay| (relay, None)).into_iter().collect();
-            let mut setup = departing(10, &leaves);
-            setup.settings.flying = flying + u16::from(flying > 0 && leaver.is_none());
-            setup.spares = vec![5, 6];
-            let others = (1..=10).filter(|of| *of != deaf);
-            setup.deaf = others
-                .map(|of| OneWayFailure {
-                    by: deaf,
-                    of,
-                    from: seconds(1),
-                    until: None,
-                })
-                .collect();
-            let outcome = run(setup).unwrap();
-            let name = format!("flying {flying}, leaver {leaver:?}, deaf {deaf}");
-            let joined = |what| matches!(what, TimelineEvent::ViewAccepted { relays: 9, .. });
-            assert!(!times(&outcome, able, joined).is_empty(), "{name}");
-            assert!(
-                leaver.is_none_or(|it| freed(&outcome, it).is_some()),
-                "{name}"
-            );
-        }
-    }
-}
-
 /// Checks that a called spare takes no relay that searches for its neighbour for the end of the chain.
 ///
 /// Relay 6 dies while the spare 5 receives no call. The call arrives at various times of the search of relay 4. The

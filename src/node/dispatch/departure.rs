@@ -620,9 +620,7 @@ impl Node {
             // counts, else the one that was received first.
             let called = self.layers.lease.orders().joiner;
             let known = self.layers.leaving.spare(now, &self.member.settings);
-            // A spare that does not receive this relay cannot be called.
-            let counts = [0, from].contains(&known) || called == from;
-            if counts && hello.is_heard(from, self.member.node) {
+            if [0, from].contains(&known) || called == from {
                 self.layers.leaving.heard_spare = Some((from, now));
             }
         }
