@@ -57,7 +57,8 @@ use crate::features::DEPARTURES;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
+use crate::wire::message::{AT_ONCE, Leave, Message, Orders, OwnRequests, Pulse, Pulsed};
+use crate::wire::message::{Requests, push, used};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
@@ -102,7 +103,7 @@ pub(crate) struct Lease {
 /// Requests of this relay to the leader. At the leader also the state of departures from the chain.
 #[derive(Clone, Copy, Debug)]
 struct Departures {
-    requests: Requests,
+    requests: OwnRequests,
     /// Number of relays in the view before a relay first requested to leave.
     complement: u16,
     /// Relay that requests to leave (0 for none), and the time of its first request. The request may be from an earlier
@@ -202,7 +203,13 @@ impl Lease {
             orders: Orders::NONE,
             requests: None,
             departures: [Departures {
-                requests: Requests::NONE,
+                requests: OwnRequests {
+                    node: 0,
+                    gap: 0,
+                    leave: Leave::NONE,
+                    spare: 0,
+                    in_place: false,
+                },
                 complement: 0,
                 leaver: (0, now),
                 settled_at: now,
@@ -214,7 +221,7 @@ impl Lease {
 
     /// Sets the requests that this relay sends to the leader in its replies to lease renewals. They are the relay's
     /// wish to leave, a spare (relay outside of the chain), and the report that the relay is in place.
-    pub(crate) fn set_requests(&mut self, requests: Requests) {
+    pub(crate) fn set_requests(&mut self, requests: OwnRequests) {
         if let Some(departures) = self.departures.first_mut() {
             departures.requests = requests;
         }
@@ -222,7 +229,8 @@ impl Lease {
 
     /// Returns true if a relay of the view receives a spare, as far as this relay knows. The leader knows it of all.
     pub(crate) fn knows_spare(&self) -> bool {
-        self.orders.joiner != 0 || self.requests.is_some_and(|it| it.spare != 0)
+        let [joiner, ..] = self.orders.joiners;
+        joiner != 0 || self.requests.is_some_and(|it| it.spares != [0; AT_ONCE])
     }
 
     pub(crate) const fn orders(&self) -> Orders {
@@ -246,16 +254,16 @@ impl Lease {
 
     /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
-    /// A relay is ordered to leave once two consecutive renewals have reported all relays in place. By then a relay
-    /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
-    /// it joins first, unless the view already has more relays than `Settings::flying`, or, without this number, more
-    /// than before the request to leave. If the view has fewer than `Settings::flying`, a spare is called at once, also
-    /// while relays move.
+    /// Relays are ordered to leave once two consecutive renewals have reported all relays in place. By then a relay
+    /// that left the chain earlier knows that all relays are in place. If there are spares (relays that wait outside),
+    /// one for each departure joins first, unless the view already has more relays than `Settings::flying`, or, without
+    /// this number, more than before the requests to leave. As many relays may then leave as the view has more, at
+    /// least one. If the view has fewer than `Settings::flying`, spares are called at once, also while relays move.
     ///
     /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration
     /// of a motion, counted from the first agreement in this view, or from the last time that all were in place. A
-    /// relay waits for its order to leave at most this maximum duration, and at most its remaining endurance. So at
-    /// least half of the endurance at the first request remains.
+    /// relay with a request to leave waits for spares at most this maximum duration, and at most its remaining
+    /// endurance. So at least half of the endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -272,36 +280,62 @@ impl Lease {
             in_place,
             ..Orders::NONE
         };
-        if requests.leaver == 0 || known.complement == 0 {
+        let [urgent, ..] = requests.leaves;
+        let leaves = urgent.node != 0;
+        if !leaves || known.complement == 0 {
             known.complement = relays;
         }
-        let leaves = requests.leaver != 0;
-        if requests.leaver != known.leaver.0 || !leaves && requests.spare != 0 {
-            known.leaver = (requests.leaver, now);
+        if urgent.node != known.leaver.0 || !leaves && requests.spares != [0; AT_ONCE] {
+            known.leaver = (urgent.node, now);
         }
         let waited = now.since(known.leaver.1);
-        let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
-        let may_leave = leaves && context.member.keeps_quorum_without(requests.leaver);
+        let left = Duration::from_millis(1_000).times(urgent.endurance_s.into());
+        let may_leave = leaves && context.member.keeps_quorum_without(&[urgent.node]);
         let is_over = waited >= most || leaves && waited >= left;
         let late = may_leave && is_over;
         // A spare is silent between the order to join and its arrival. The call of a spare that never arrives ends.
-        let spare = if requests.spare == 0 && !is_over {
-            self.orders.joiner
+        let spares = if requests.spares == [0; AT_ONCE] && !is_over {
+            self.orders.joiners
         } else {
-            requests.spare
+            requests.spares
         };
         // A departure needs one relay more than the chain keeps.
         let kept = match flying(context.settings()) {
             0 if leaves => known.complement,
             flying => flying,
         };
-        let joins = spare != 0 && relays < kept.saturating_add(leaves.into()) && !late;
+        let wish = |leave: &&Leave| leave.node != 0;
+        let wanted = requests
+            .leaves
+            .iter()
+            .filter(wish)
+            .fold(kept, |sum, _| sum.saturating_add(1));
+        let joins = spares != [0; AT_ONCE] && relays <= kept && relays < wanted && !late;
         let settled = in_place && self.orders.in_place;
-        let is_called = self.orders.joiner != 0;
-        if joins && (settled || is_called || relays < flying(context.settings())) {
-            orders.joiner = spare;
-        } else if !joins && may_leave && (late || settled) {
-            orders.leaver = requests.leaver;
+        let is_called = self.orders.joiners != [0; AT_ONCE];
+        // With three requests, the next spares join while the relays still move after the last departures.
+        let is_busy = matches!(requests.leaves, [_, _, third, ..] if third.node != 0);
+        let at_once = is_called || is_busy || relays < flying(context.settings());
+        if joins && (settled || at_once) {
+            // The called ones are the first ones.
+            for spare in used(&spares).take(wanted.saturating_sub(relays).into()) {
+                push(&mut orders.joiners, spare);
+            }
+        } else if !joins
+            && may_leave
+            && (settled || late && (in_place || self.orders.leavers.contains(&urgent.node)))
+        {
+            let most = relays.saturating_sub(kept).max(1);
+            let member = context.member;
+            for leave in requests.leaves.iter().take(most.into()) {
+                // The leader leaves alone: the renewals end when it is outside.
+                let alone = [leave.node, urgent.node].contains(&member.node);
+                let mut leavers = orders.leavers;
+                push(&mut leavers, leave.node);
+                if (leave.node == urgent.node || !alone) && member.keeps_quorum_without(&leavers) {
+                    orders.leavers = leavers;
+                }
+            }
         }
         orders
     }
@@ -502,19 +536,19 @@ impl Lease {
         else {
             return;
         };
+        // At the last relay of the chain the collection of requests begins.
+        let received = received.unwrap_or(Requests {
+            in_place: true,
+            ..Requests::NONE
+        });
         self.requests = match self.departures.first() {
-            // At the last relay of the chain the collection of requests begins.
-            None => received.or(Some(Requests {
-                in_place: true,
-                ..Requests::NONE
-            })),
+            None => Some(received),
             Some(Departures { requests, .. }) => {
-                let own = Requests {
+                let own = OwnRequests {
                     in_place: requests.in_place && self.is_agreed,
                     ..*requests
                 };
-                let called = self.orders.joiner;
-                Some(received.map_or(own, |received| received.merge(own, called)))
+                Some(received.with(&own, &self.orders.joiners))
             }
         };
         if let Some(departures) = self.departures.first_mut() {
@@ -655,7 +689,7 @@ mod tests {
     use crate::settings::Settings;
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
-    use crate::wire::message::Requests;
+    use crate::wire::message::{AT_ONCE, Leave, Nodes, OwnRequests, Requests};
 
     /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
     /// change the leader is in view 1, and its lease renewal has been outstanding for 40 s. The new view, number `base`
@@ -694,6 +728,62 @@ mod tests {
             is_last_reachable: false,
             other_leases: OtherLeases::NONE,
         }
+    }
+
+    fn nodes(all: &[u16]) -> Nodes {
+        let mut nodes = [0; AT_ONCE];
+        nodes[..all.len()].copy_from_slice(all);
+        nodes
+    }
+
+    /// Returns requests to leave: node numbers and endurances, s.
+    fn leaves(all: &[(u16, u16)]) -> [Leave; AT_ONCE] {
+        let mut leaves = [Leave::NONE; AT_ONCE];
+        for (place, (node, endurance_s)) in leaves.iter_mut().zip(all) {
+            (place.node, place.endurance_s) = (*node, *endurance_s);
+        }
+        leaves
+    }
+
+    /// Returns the requests of relay `node`, which is in place. It has the endurance `left_s`, s, if it wants to leave.
+    fn own(node: u16, left_s: Option<u16>) -> OwnRequests {
+        let leave = left_s.map_or(Leave::NONE, |endurance_s| Leave { node, endurance_s });
+        OwnRequests {
+            node,
+            gap: 1,
+            leave,
+            spare: 0,
+            in_place: true,
+        }
+    }
+
+    /// Checks that the most urgent requests are kept, and of two that are too near to each other the more urgent one.
+    #[test]
+    fn the_most_urgent_requests_are_kept() {
+        let kept = |wishes: &[(u16, u16)]| {
+            let all = wishes.iter().rev();
+            let all = all.fold(Requests::NONE, |all, (node, left_s)| {
+                all.with(&own(*node, Some(*left_s)), &nodes(&[]))
+            });
+            all.leaves
+        };
+        assert_eq!(kept(&[(1, 90), (7, 80)]), leaves(&[(7, 80), (1, 90)]));
+        // Relay 1 knows only that relay 6 is at least the second one from here.
+        assert_eq!(kept(&[(1, 90), (6, 80)]), leaves(&[(6, 80)]));
+        assert_eq!(kept(&[(1, 80), (6, 80)]), leaves(&[(1, 80)]));
+        assert_eq!(
+            kept(&[(1, 70), (5, 80), (11, 90)]),
+            leaves(&[(1, 70), (11, 90)])
+        );
+        assert_eq!(
+            kept(&[(1, 90), (5, 80), (10, 70)]),
+            leaves(&[(10, 70), (1, 90)])
+        );
+        let six = [(1, 60), (11, 50), (21, 40), (31, 30), (41, 20), (51, 70)];
+        assert_eq!(
+            kept(&six),
+            leaves(&[(41, 20), (31, 30), (21, 40), (11, 50)])
+        );
     }
 
     /// Returns the times, s, at which the leader's orders state that some relay is not in place. The leader agrees at 0
@@ -735,14 +825,13 @@ mod tests {
         let mut called = |at_s: u64, spare: u16| {
             let context = context(&member, at_s);
             lease.requests = Some(Requests {
-                leaver: 1,
-                endurance_s: u16::MAX,
-                spare,
+                leaves: leaves(&[(1, u16::MAX)]),
+                spares: nodes(&[spare]),
                 in_place: true,
             });
             lease.orders = lease.next_orders(&context);
-            assert_eq!(lease.orders.leaver, 0, "{at_s} s");
-            lease.orders.joiner
+            assert_eq!(lease.orders.leavers, nodes(&[]), "{at_s} s");
+            lease.orders.joiners[0]
         };
         assert_eq!([5, 10].map(|at_s| called(at_s, 3)), [0, 3]);
         assert_eq!(called(15, 0), 3);
@@ -767,12 +856,12 @@ mod tests {
             let mut joiners = Vec::new();
             for &(at_s, spare) in reports {
                 lease.requests = Some(Requests {
-                    spare,
+                    spares: nodes(&[spare]),
                     ..Requests::NONE
                 });
                 lease.orders = lease.next_orders(&context(&member, at_s));
-                assert_eq!(lease.orders.leaver, 0);
-                joiners.push(lease.orders.joiner);
+                assert_eq!(lease.orders.leavers, nodes(&[]));
+                joiners.push(lease.orders.joiners[0]);
             }
             joiners
         };
@@ -783,30 +872,91 @@ mod tests {
         assert_eq!(called(4, &reports), [0, 5, 5, 5, 0]);
     }
 
+    /// Checks that a relay that has waited too long is ordered to leave only while all relays are in place.
+    ///
+    /// During a motion the neighbour toward Tx would wait for the fence beside the relay, and the neighbour toward Rx
+    /// would give it up. An order that was given remains.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn a_late_departure_waits_for_the_end_of_a_motion() {
+        let settings = Settings::default();
+        let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
+        let mut lease = Lease::new(1, Instant::ZERO, &settings);
+        lease.on_agreement(Instant::ZERO, true);
+        let mut ordered = |at_s: u64, endurance_s: u16, in_place: bool| {
+            lease.requests = Some(Requests {
+                leaves: leaves(&[(2, endurance_s)]),
+                in_place,
+                ..Requests::NONE
+            });
+            lease.orders = lease.next_orders(&context(&member, at_s));
+            lease.orders.leavers[0]
+        };
+        assert_eq!([5, 10, 15].map(|at_s| ordered(at_s, 5, false)), [0; 3]);
+        assert_eq!(ordered(20, 5, true), 2);
+        assert_eq!(ordered(25, 0, false), 2);
+    }
+
+    /// Checks that as many relays leave at once as spares have joined, and that the leader leaves alone.
+    #[cfg(feature = "departures")]
+    #[test]
+    fn as_many_relays_leave_as_spares_have_joined() {
+        let orders = |flying: u16, wishes: &[(u16, u16)], spares: &[u16]| {
+            let settings = Settings {
+                flying,
+                ..Settings::default()
+            };
+            let member = Member::new(Mission::try_new(paper(20)).unwrap(), settings, 1);
+            let mut lease = Lease::new(1, Instant::ZERO, &settings);
+            lease.on_agreement(Instant::ZERO, true);
+            lease.orders.in_place = true;
+            lease.requests = Some(Requests {
+                leaves: leaves(wishes),
+                spares: nodes(spares),
+                in_place: true,
+            });
+            let orders = lease.next_orders(&context(&member, 5));
+            (orders.leavers, orders.joiners)
+        };
+        let three = [(19, 40), (8, 60), (2, 80)];
+        assert_eq!(
+            orders(20, &three, &[22, 23, 24, 25]),
+            (nodes(&[]), nodes(&[22, 23, 24]))
+        );
+        assert_eq!(orders(20, &three, &[22]), (nodes(&[]), nodes(&[22])));
+        assert_eq!(orders(20, &three, &[]), (nodes(&[19]), nodes(&[])));
+        assert_eq!(orders(18, &three, &[22]), (nodes(&[19, 8]), nodes(&[])));
+        assert_eq!(
+            orders(11, &three, &[22]),
+            (nodes(&three.map(|it| it.0)), nodes(&[]))
+        );
+        let with_leader = [(19, 40), (8, 60), (1, 80)];
+        assert_eq!(orders(11, &with_leader, &[]).0, nodes(&[19, 8]));
+        assert_eq!(orders(11, &[(1, 20), (19, 40)], &[]).0, nodes(&[1]));
+    }
+
     /// Checks that a called spare comes before that of a relay with a more urgent request.
     #[cfg(feature = "departures")]
     #[test]
     fn a_called_spare_comes_before_others() {
-        let settings = Settings::default();
-        let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
-        let spare_if_called = |called: u16| {
-            let mut lease = Lease::new(1, Instant::ZERO, &settings);
-            lease.current = Some(Current {
-                number: 7,
-                span: 150,
-            });
-            lease.circulation.start(Instant::ZERO);
-            lease.orders.joiner = called;
-            let with = |leaver: u16, spare: u16| Requests {
-                leaver,
-                spare,
-                ..Requests::NONE
-            };
-            lease.set_requests(with(0, 6));
-            lease.complete_renewal(&context(&member, 1), Some(with(3, 5)));
-            lease.requests.unwrap().spare
+        let received = Requests {
+            leaves: leaves(&[(9, 60)]),
+            spares: nodes(&[7]),
+            in_place: true,
         };
-        assert_eq!([0, 5, 6, 7].map(spare_if_called), [5, 5, 6, 5]);
+        let spares_if_called = |called: u16, gap: u16| {
+            let own = OwnRequests {
+                spare: 6,
+                gap,
+                ..own(4, None)
+            };
+            received.with(&own, &nodes(&[called])).spares
+        };
+        // Spares 6 and 7 are in two gaps, or in one.
+        let two = [0, 7, 6, 5].map(|called| spares_if_called(called, 1));
+        assert_eq!(two, [[7, 6], [7, 6], [6, 7], [7, 6]].map(|all| nodes(&all)));
+        let one = [0, 7, 6, 5].map(|called| spares_if_called(called, 4));
+        assert_eq!(one, [7, 7, 6, 7].map(|spare| nodes(&[spare])));
     }
 
     /// Checks that relays that move after a later agreement of a view are not in place.
