@@ -476,11 +476,11 @@ fn append<const W: usize>(
     Some(end)
 }
 
-/// Decodes a list that [`append`] has encoded; returns the list and the remaining bytes.
+/// Decodes a list that [`append`] has encoded; returns the list and the remaining bytes. A node number of 0 becomes an
+/// invalid one, because it would end the list.
 ///
 /// # Errors
-/// [`MessageError::Encoding`] if there are too many elements or too few bytes; [`MessageError::Value`] if a node number
-/// is 0 or above 1000.
+/// [`MessageError::Encoding`] if there are too many elements or too few bytes.
 fn take_list<const W: usize>(bytes: &[u8]) -> Result<([[u16; W]; AT_ONCE], &[u8]), MessageError> {
     let (count, mut rest) = bytes.split_first().ok_or(MessageError::Encoding)?;
     let mut list = [[0; W]; AT_ONCE];
@@ -491,9 +491,17 @@ fn take_list<const W: usize>(bytes: &[u8]) -> Result<([[u16; W]; AT_ONCE], &[u8]
             *number = u16::from_le_bytes(*word);
             rest = after;
         }
-        require(item.first().is_some_and(|node| is_size(*node)))?;
+        if let Some(node @ 0) = item.first_mut() {
+            *node = u16::MAX;
+        }
     }
     Ok((list, rest))
+}
+
+/// Returns true if the list contains only valid node numbers.
+fn is_valid<const W: usize>(list: &[[u16; W]; AT_ONCE]) -> bool {
+    let mut nodes = list.iter().filter_map(|item| item.first());
+    nodes.all(|node| *node <= MAX_RELAYS)
 }
 
 impl Pulse {
@@ -517,7 +525,7 @@ impl Pulse {
             return Err(MessageError::Encoding);
         };
         let lease = lease.number();
-        require(lease != 0)?;
+        require(lease != 0 && is_valid(&leavers) && is_valid(&joiners))?;
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
@@ -551,6 +559,7 @@ impl Pulsed {
         let (spares, []) = take_list(rest)? else {
             return Err(MessageError::Encoding);
         };
+        require(is_valid(&leaves) && is_valid(&spares))?;
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
