@@ -184,21 +184,19 @@ local messages = {
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "lease_ds", kind = "u16", unit = "0.1 s", text = "duration of the lease after a member has taken part in a renewal", per = 10, base = "s" },
         { name = "in_place", kind = "bool", unit = "", text = "true if all relays are in place, see Departures" },
-        { name = "nodes", kind = "option", of = { kind = "group", fields = {
-            { name = "leaver", kind = "u16", unit = "", text = "relay that may leave the view, or 0" },
-            { name = "joiner", kind = "u16", unit = "", text = "relay that is called to join, or 0" },
-        } }, unit = "", text = "none if both are 0:" },
+        { name = "leavers", kind = "list", most = 4, of = { kind = "u16" }, unit = "", text = "relays that may leave the view" },
+        { name = "joiners", kind = "list", most = 4, of = { kind = "u16" }, unit = "", text = "relays that are called to join" },
     } },
     [0x10] = { name = "Pulsed", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
-        { name = "endurance_s", kind = "u16", unit = "s", text = "endurance of the drone of `leaver`, at least 1; 65535 if unknown; 0 if `leaver` is that of the Pulse" },
         { name = "in_place", kind = "bool", unit = "", text = "true if the sender and all relays after it are in place" },
-        { name = "nodes", kind = "option", of = { kind = "group", fields = {
-            { name = "leaver", kind = "u16", unit = "", text = "relay that would leave, or 0" },
-            { name = "spare", kind = "u16", unit = "", text = "spare that would join, or 0" },
-        } }, unit = "", text = "none if both are 0:" },
-        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed, back from the last relay; else the other fields have no meaning" },
+        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed; else the other fields have no meaning" },
+        { name = "requests", kind = "list", most = 4, of = { kind = "group", fields = {
+            { name = "relay", kind = "u16", unit = "", text = "relay that would leave" },
+            { name = "endurance_s", kind = "u16", unit = "s", text = "endurance of its drone, at least 1; 65535 if unknown; 0 if it is a leaver of the Pulse" },
+        } }, unit = "", text = "requests to leave, the most urgent one first" },
+        { name = "spares", kind = "list", most = 4, of = { kind = "u16" }, unit = "", text = "spares that would join" },
     } },
     [0x11] = { name = "Sense", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },

@@ -83,15 +83,18 @@ impl Member {
         node >= 1 && node <= self.all
     }
 
-    /// Returns true if the other relays of the view have a quorum without its member `node`, or need none.
-    pub(crate) const fn keeps_quorum_without(&self, node: u16) -> bool {
+    /// Returns true if the other relays of the view have a quorum without its members `nodes`, or need none. A node
+    /// number of 0 does not count.
+    pub(crate) fn keeps_quorum_without(&self, nodes: &[u16]) -> bool {
         let relays = self.mission.relays();
+        let known = nodes.iter().filter(|node| **node != 0);
+        let left = known.fold(relays, |left, _| left.saturating_sub(1));
         let proposer = match self.view {
             ViewId::LOADED => self.mission.leader(),
             view => view.proposer(),
         };
-        let weight = 2 * relays.saturating_sub(1) + (proposer != node) as u16;
-        relays >= 2 && (!self.settings.quorum || weight > relays)
+        let weight = 2 * left + u16::from(!nodes.contains(&proposer));
+        left >= 1 && (!self.settings.quorum || weight > relays)
     }
 
     /// Returns a digest of the active mission and the accepted view. Every message of an agreement on positions

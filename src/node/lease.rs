@@ -57,7 +57,8 @@ use crate::features::DEPARTURES;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
+use crate::wire::message::{AT_ONCE, Leave, Message, Orders, OwnRequests, Pulse, Pulsed};
+use crate::wire::message::{Requests, push, used};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
@@ -102,7 +103,7 @@ pub(crate) struct Lease {
 /// Requests of this relay to the leader. At the leader also the state of departures from the chain.
 #[derive(Clone, Copy, Debug)]
 struct Departures {
-    requests: Requests,
+    requests: OwnRequests,
     /// Number of relays in the view before a relay first requested to leave.
     complement: u16,
     /// Relay that requests to leave (0 for none), and the time of its first request. The request may be from an earlier
@@ -202,7 +203,13 @@ impl Lease {
             orders: Orders::NONE,
             requests: None,
             departures: [Departures {
-                requests: Requests::NONE,
+                requests: OwnRequests {
+                    node: 0,
+                    gap: 0,
+                    leave: Leave::NONE,
+                    spare: 0,
+                    in_place: false,
+                },
                 complement: 0,
                 leaver: (0, now),
                 settled_at: now,
@@ -214,7 +221,7 @@ impl Lease {
 
     /// Sets the requests that this relay sends to the leader in its replies to lease renewals. They are the relay's
     /// wish to leave, a spare (relay outside of the chain), and the report that the relay is in place.
-    pub(crate) fn set_requests(&mut self, requests: Requests) {
+    pub(crate) fn set_requests(&mut self, requests: OwnRequests) {
         if let Some(departures) = self.departures.first_mut() {
             departures.requests = requests;
         }
@@ -222,7 +229,8 @@ impl Lease {
 
     /// Returns true if a relay of the view receives a spare, as far as this relay knows. The leader knows it of all.
     pub(crate) fn knows_spare(&self) -> bool {
-        self.orders.joiner != 0 || self.requests.is_some_and(|it| it.spare != 0)
+        let [joiner, ..] = self.orders.joiners;
+        joiner != 0 || self.requests.is_some_and(|it| it.spares != [0; AT_ONCE])
     }
 
     pub(crate) const fn orders(&self) -> Orders {
@@ -246,16 +254,16 @@ impl Lease {
 
     /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
-    /// A relay is ordered to leave once two consecutive renewals have reported all relays in place. By then a relay
-    /// that left the chain earlier knows that all relays are in place. If there is a spare (relay that waits outside),
-    /// it joins first, unless the view already has more relays than `Settings::flying`, or, without this number, more
-    /// than before the request to leave. If the view has fewer than `Settings::flying`, a spare is called at once, also
-    /// while relays move.
+    /// Relays are ordered to leave once two consecutive renewals have reported all relays in place. By then a relay
+    /// that left the chain earlier knows that all relays are in place. If there are spares (relays that wait outside),
+    /// one for each departure joins first, unless the view already has more relays than `Settings::flying`, or, without
+    /// this number, more than before the requests to leave. As many relays may then leave as the view has more, at
+    /// least one. If the view has fewer than `Settings::flying`, spares are called at once, also while relays move.
     ///
     /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration
     /// of a motion, counted from the first agreement in this view, or from the last time that all were in place. A
-    /// relay waits for its order to leave at most this maximum duration, and at most its remaining endurance. So at
-    /// least half of the endurance at the first request remains.
+    /// relay with a request to leave waits for spares at most this maximum duration, and at most its remaining
+    /// endurance. So at least half of the endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -272,36 +280,62 @@ impl Lease {
             in_place,
             ..Orders::NONE
         };
-        if requests.leaver == 0 || known.complement == 0 {
+        let [urgent, ..] = requests.leaves;
+        let leaves = urgent.node != 0;
+        if !leaves || known.complement == 0 {
             known.complement = relays;
         }
-        let leaves = requests.leaver != 0;
-        if requests.leaver != known.leaver.0 || !leaves && requests.spare != 0 {
-            known.leaver = (requests.leaver, now);
+        if urgent.node != known.leaver.0 || !leaves && requests.spares != [0; AT_ONCE] {
+            known.leaver = (urgent.node, now);
         }
         let waited = now.since(known.leaver.1);
-        let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
-        let may_leave = leaves && context.member.keeps_quorum_without(requests.leaver);
+        let left = Duration::from_millis(1_000).times(urgent.endurance_s.into());
+        let may_leave = leaves && context.member.keeps_quorum_without(&[urgent.node]);
         let is_over = waited >= most || leaves && waited >= left;
         let late = may_leave && is_over;
         // A spare is silent between the order to join and its arrival. The call of a spare that never arrives ends.
-        let spare = if requests.spare == 0 && !is_over {
-            self.orders.joiner
+        let spares = if requests.spares == [0; AT_ONCE] && !is_over {
+            self.orders.joiners
         } else {
-            requests.spare
+            requests.spares
         };
         // A departure needs one relay more than the chain keeps.
         let kept = match flying(context.settings()) {
             0 if leaves => known.complement,
             flying => flying,
         };
-        let joins = spare != 0 && relays < kept.saturating_add(leaves.into()) && !late;
+        let wish = |leave: &&Leave| leave.node != 0;
+        let wanted = requests
+            .leaves
+            .iter()
+            .filter(wish)
+            .fold(kept, |sum, _| sum.saturating_add(1));
+        let joins = spares != [0; AT_ONCE] && relays <= kept && relays < wanted && !late;
         let settled = in_place && self.orders.in_place;
-        let is_called = self.orders.joiner != 0;
-        if joins && (settled || is_called || relays < flying(context.settings())) {
-            orders.joiner = spare;
-        } else if !joins && may_leave && (late || settled) {
-            orders.leaver = requests.leaver;
+        let is_called = self.orders.joiners != [0; AT_ONCE];
+        // With three requests, the next spares join while the relays still move after the last departures.
+        let is_busy = matches!(requests.leaves, [_, _, third, ..] if third.node != 0);
+        let at_once = is_called || is_busy || relays < flying(context.settings());
+        if joins && (settled || at_once) {
+            // The called ones are the first ones.
+            for spare in used(&spares).take(wanted.saturating_sub(relays).into()) {
+                push(&mut orders.joiners, spare);
+            }
+        } else if !joins
+            && may_leave
+            && (settled || late && (in_place || self.orders.leavers.contains(&urgent.node)))
+        {
+            let most = relays.saturating_sub(kept).max(1);
+            let member = context.member;
+            for leave in requests.leaves.iter().take(most.into()) {
+                // The leader leaves alone: the renewals end when it is outside.
+                let alone = [leave.node, urgent.node].contains(&member.node);
+                let mut leavers = orders.leavers;
+                push(&mut leavers, leave.node);
+                if (leave.node == urgent.node || !alone) && member.keeps_quorum_without(&leavers) {
+                    orders.leavers = leavers;
+                }
+            }
         }
         orders
     }
@@ -502,19 +536,19 @@ impl Lease {
         else {
             return;
         };
+        // At the last relay of the chain the collection of requests begins.
+        let received = received.unwrap_or(Requests {
+            in_place: true,
+            ..Requests::NONE
+        });
         self.requests = match self.departures.first() {
-            // At the last relay of the chain the collection of requests begins.
-            None => received.or(Some(Requests {
-                in_place: true,
-                ..Requests::NONE
-            })),
+            None => Some(received),
             Some(Departures { requests, .. }) => {
-                let own = Requests {
+                let own = OwnRequests {
                     in_place: requests.in_place && self.is_agreed,
                     ..*requests
                 };
-                let called = self.orders.joiner;
-                Some(received.map_or(own, |received| received.merge(own, called)))
+                Some(received.with(&own, &self.orders.joiners))
             }
         };
         if let Some(departures) = self.departures.first_mut() {
@@ -643,193 +677,4 @@ impl Lease {
 }
 
 #[cfg(test)]
-mod tests {
-    extern crate std;
-
-    use std::vec::Vec;
-
-    use super::{Current, Lease, longest_lease};
-    use crate::mission::Mission;
-    use crate::mission::tests::paper;
-    use crate::node::context::{Context, Member, OtherLeases};
-    use crate::settings::Settings;
-    use crate::time::{Duration, Instant};
-    use crate::view::ViewId;
-    use crate::wire::message::Requests;
-
-    /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
-    /// change the leader is in view 1, and its lease renewal has been outstanding for 40 s. The new view, number `base`
-    /// + 1, replaces view `base`, and no relay is lost.
-    fn span_after(base: u32) -> u16 {
-        let settings = Settings::default();
-        let view = |number: u32| ViewId::from_bits(number << 10 | 1);
-        let mut lease = Lease::new(1, Instant::ZERO, &settings);
-        lease.bounds.accepted = (view(1), Instant::ZERO);
-        lease.current = Some(Current {
-            number: 7,
-            span: 150,
-        });
-        lease.circulation.start(Instant::ZERO);
-        let now = Instant::ZERO + Duration::from_millis(40_000);
-        lease.accept_view(now, (view(base + 1), view(base)), now, false);
-        lease.announced_span(&settings)
-    }
-
-    #[test]
-    fn an_unfinished_pulse_of_the_last_view_counts_as_slow() {
-        assert!(span_after(1) >= 1_200);
-    }
-
-    #[test]
-    fn an_unfinished_pulse_of_a_relay_left_out_does_not_count() {
-        assert_eq!(span_after(2), 150);
-    }
-
-    #[cfg(feature = "departures")]
-    fn context(member: &Member, at_s: u64) -> Context<'_> {
-        Context {
-            now: Instant::from_millis(1_000 * at_s),
-            member,
-            latest: member.active,
-            is_last_reachable: false,
-            other_leases: OtherLeases::NONE,
-        }
-    }
-
-    /// Returns the times, s, at which the leader's orders state that some relay is not in place. The leader agrees at 0
-    /// s, and every 5 s, until 300 s, gives orders after a renewal that reports `is_in_place(time)`.
-    #[cfg(feature = "departures")]
-    fn not_in_place(respacing_s: u64, is_in_place: impl Fn(u64) -> bool) -> Vec<u64> {
-        let settings = Settings {
-            respacing: Duration::from_millis(1_000 * respacing_s),
-            ..Settings::default()
-        };
-        let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
-        let mut lease = Lease::new(1, Instant::ZERO, &settings);
-        lease.on_agreement(Instant::ZERO, true);
-        let mut gives = |at_s: u64| {
-            let context = context(&member, at_s);
-            lease.requests = Some(Requests {
-                in_place: is_in_place(at_s),
-                ..Requests::NONE
-            });
-            lease.orders = lease.next_orders(&context);
-            lease.orders.in_place
-        };
-        let all = (5..=300).step_by(5);
-        all.filter(|at_s| !gives(*at_s)).collect()
-    }
-
-    /// Checks that a spare that never arrives is called no longer, for the proposer of a view of two.
-    ///
-    /// The proposer keeps no quorum without a spare. If the spare never arrives, the other relay may leave.
-    #[cfg(feature = "departures")]
-    #[test]
-    fn a_called_spare_that_never_arrives_is_called_no_longer() {
-        let settings = Settings::default();
-        let mission = Mission::try_new(paper(3)).unwrap();
-        let mut member = Member::new(mission, settings, 1);
-        member.mission = mission.with_relays(2).unwrap();
-        let mut lease = Lease::new(1, Instant::ZERO, &settings);
-        lease.on_agreement(Instant::ZERO, true);
-        let mut called = |at_s: u64, spare: u16| {
-            let context = context(&member, at_s);
-            lease.requests = Some(Requests {
-                leaver: 1,
-                endurance_s: u16::MAX,
-                spare,
-                in_place: true,
-            });
-            lease.orders = lease.next_orders(&context);
-            assert_eq!(lease.orders.leaver, 0, "{at_s} s");
-            lease.orders.joiner
-        };
-        assert_eq!([5, 10].map(|at_s| called(at_s, 3)), [0, 3]);
-        assert_eq!(called(15, 0), 3);
-        let most_s = longest_lease(&settings).as_micros() / 1_000_000;
-        assert_eq!(called(most_s, 0), 3);
-        assert_eq!(called(most_s + 10, 0), 0);
-        assert_eq!(called(most_s + 20, 3), 3);
-    }
-
-    /// Checks that the leader calls a spare without a request to leave only if relays are too few. A spare that never arrives is called no longer.
-    #[cfg(feature = "departures")]
-    #[test]
-    fn a_spare_is_called_while_relays_are_too_few() {
-        let called = |flying: u16, reports: &[(u64, u16)]| {
-            let settings = Settings {
-                flying,
-                ..Settings::default()
-            };
-            let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
-            let mut lease = Lease::new(1, Instant::ZERO, &settings);
-            lease.on_agreement(Instant::ZERO, true);
-            let mut joiners = Vec::new();
-            for &(at_s, spare) in reports {
-                lease.requests = Some(Requests {
-                    spare,
-                    ..Requests::NONE
-                });
-                lease.orders = lease.next_orders(&context(&member, at_s));
-                assert_eq!(lease.orders.leaver, 0);
-                joiners.push(lease.orders.joiner);
-            }
-            joiners
-        };
-        let most_s = longest_lease(&Settings::default()).as_micros() / 1_000_000;
-        let reports = [(5, 0), (10, 5), (15, 0), (most_s + 5, 0), (most_s + 15, 0)];
-        assert_eq!(called(0, &reports), [0; 5]);
-        assert_eq!(called(3, &reports), [0; 5]);
-        assert_eq!(called(4, &reports), [0, 5, 5, 5, 0]);
-    }
-
-    /// Checks that a called spare comes before that of a relay with a more urgent request.
-    #[cfg(feature = "departures")]
-    #[test]
-    fn a_called_spare_comes_before_others() {
-        let settings = Settings::default();
-        let member = Member::new(Mission::try_new(paper(3)).unwrap(), settings, 1);
-        let spare_if_called = |called: u16| {
-            let mut lease = Lease::new(1, Instant::ZERO, &settings);
-            lease.current = Some(Current {
-                number: 7,
-                span: 150,
-            });
-            lease.circulation.start(Instant::ZERO);
-            lease.orders.joiner = called;
-            let with = |leaver: u16, spare: u16| Requests {
-                leaver,
-                spare,
-                ..Requests::NONE
-            };
-            lease.set_requests(with(0, 6));
-            lease.complete_renewal(&context(&member, 1), Some(with(3, 5)));
-            lease.requests.unwrap().spare
-        };
-        assert_eq!([0, 5, 6, 7].map(spare_if_called), [5, 5, 6, 5]);
-    }
-
-    /// Checks that relays that move after a later agreement of a view are not in place.
-    ///
-    /// A single report after the time limit proves nothing: it does not restart the limit.
-    #[cfg(feature = "departures")]
-    #[test]
-    fn relays_in_place_are_asked_again_after_later_agreements() {
-        let from_to = |from: u64, to: u64| (from..=to).step_by(5).collect::<Vec<_>>();
-        let moved = from_to(105, 155);
-        assert_eq!(not_in_place(0, |at_s| at_s <= 100), moved);
-        assert_eq!(not_in_place(0, |at_s| at_s <= 100 || at_s == 200), moved);
-        let twice = not_in_place(0, |at_s| at_s <= 100 || [200, 205].contains(&at_s));
-        assert_eq!(twice, [moved, from_to(210, 260)].concat());
-    }
-
-    /// Checks that the slowest permitted motion ends before its relays count as in place.
-    #[cfg(feature = "departures")]
-    #[test]
-    fn relays_on_a_slow_motion_are_not_in_place() {
-        let settings = Settings::default();
-        let respacing_s = settings.dead_after.times(4).as_micros() / 1_000_000;
-        let all = not_in_place(respacing_s, |at_s| at_s > respacing_s + 30);
-        assert_eq!(all.last(), Some(&(respacing_s + 30)));
-    }
-}
+mod tests;

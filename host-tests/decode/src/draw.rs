@@ -342,13 +342,6 @@ fn obey_rules<'f>(message: &str, fields: &mut Fields<'f>) {
             proposal(fields);
         }
         "Decision" => decision(fields),
-        "Pulse" | "Pulsed" => {
-            if let Some(Value::Group(of)) = fields.get("nodes")
-                && of.0.iter().all(|(_, value)| *value == Value::Unsigned(0))
-            {
-                fields.set("nodes", Value::None);
-            }
-        }
         "Sense" | "Sensed" => {
             list(fields, "sum_ab", |sums| {
                 if let Some(Value::Single(first)) = sums.first_mut() {

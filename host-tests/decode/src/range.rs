@@ -107,13 +107,6 @@ impl<'f> Numbers<'_, 'f> {
         number == 0.0 && number.is_sign_positive()
     }
 
-    /// Returns true if a lease renewal has no group `nodes`, or if a node number in this group is not 0.
-    fn names_a_node(&self) -> bool {
-        let mut names = ["leaver", "joiner", "spare"].into_iter();
-        self.group("nodes")
-            .is_none_or(|of| names.any(|name| of.0.get(name).is_some() && !of.is_zero(name)))
-    }
-
     fn list(&self, name: &str) -> &[Value<'f>] {
         match self.0.get(name) {
             Some(Value::List(values)) => values,
@@ -181,7 +174,6 @@ fn check_rules(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str>
                 ("accepted", is_known),
             ]
         }
-        "Pulse" | "Pulsed" => &[("nodes", numbers.names_a_node())],
         "Sense" | "Sensed" => {
             let source = [
                 "source_power_w",

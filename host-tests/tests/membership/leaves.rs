@@ -467,6 +467,87 @@ fn a_spare_lets_each_of_two_relays_leave() {
     }
 }
 
+/// Returns the setup of a chain of twelve relays in which the relays `leavers` request to leave, while two spares wait.
+fn two_replaced(spares: [u16; 2], leavers: [u16; 2]) -> Setup {
+    let mut setup = departing(14, &leavers.map(|relay| (relay, None)));
+    setup.spares = spares.to_vec();
+    setup.settings.respacing = Duration::from_millis(10_000);
+    setup
+}
+
+/// Spares, and relays that leave at the same time as these spares join. The relay at the end toward Rx is among them.
+const PAIRS: [([u16; 2], [u16; 2]); 4] = [
+    ([4, 10], [7, 14]),
+    ([2, 9], [5, 14]),
+    ([7, 14], [3, 11]),
+    ([5, 8], [2, 12]),
+];
+
+/// Checks that two spares join a chain of twelve relays at the same time, and that two relays then leave it together.
+#[test]
+fn two_relays_are_replaced_at_once() {
+    for (spares, leavers) in PAIRS {
+        let setup = two_replaced(spares, leavers);
+        let outcome = run(setup.clone()).unwrap();
+        let name = format!("spares {spares:?}, leavers {leavers:?}");
+        let sizes = sizes(&outcome);
+        let free = leavers.map(|relay| freed(&outcome, relay));
+        println!("{name}: {sizes:?}, free after {free:?} s");
+        judge(&setup, &outcome, &left(14, &leavers))
+            .unwrap_or_else(|what| panic!("{name}: {what}"));
+        let [one, other] = free.map(|free| free.unwrap_or(f64::INFINITY));
+        assert!((one - other).abs() < 3.0 && one < 60.0, "{name}");
+        assert!(*sizes.iter().max().unwrap() == 14, "{name}: {sizes:?}");
+        let lost = outcome.moments.iter().find(|moment| is_loss(moment.what));
+        assert!(lost.is_none(), "{name}: {lost:?}");
+    }
+}
+
+/// Checks that relays that are near to each other, and the leader, do not leave together with others.
+#[test]
+fn relays_side_by_side_leave_one_after_the_other() {
+    for leavers in [[6, 7], [6, 8], [1, 9]] {
+        let setup = two_replaced([4, 11], leavers);
+        let outcome = run(setup.clone()).unwrap();
+        let name = format!("{leavers:?}");
+        judge(&setup, &outcome, &left(14, &leavers))
+            .unwrap_or_else(|what| panic!("{name}: {what}"));
+        let [one, other] = leavers.map(|relay| freed(&outcome, relay).unwrap());
+        println!("{name}: free after {one:.1} s and {other:.1} s");
+        assert!((one - other).abs() > 5.0, "{name}");
+    }
+}
+
+/// Checks that the death of one of two spares, or of one of two relays that leave together, is an ordinary loss.
+///
+/// The other relay may leave all the same.
+#[test]
+fn one_of_two_replacements_goes_on_if_a_relay_dies() {
+    for (spares, leavers) in PAIRS {
+        for dead in [spares[0], spares[1], leavers[0], leavers[1]] {
+            for tenths in (0..400).step_by(25) {
+                let mut setup = two_replaced(spares, leavers);
+                setup.kills = vec![(dead, Instant::from_millis(1_000 * AT_S + 100 * tenths))];
+                let outcome = run(setup.clone()).unwrap();
+                let name = format!("{spares:?} for {leavers:?}, {dead} dies after {tenths} tenths");
+                let is_free = |relay: &u16| freed(&outcome, *relay).is_some();
+                for leaver in leavers {
+                    assert!(leaver == dead || is_free(&leaver), "{name}: {leaver} stays");
+                }
+                let mut gone = leavers.to_vec();
+                gone.push(dead);
+                judge(&setup, &outcome, &left(14, &gone))
+                    .unwrap_or_else(|what| panic!("{name}: {what}"));
+            }
+        }
+    }
+}
+
+/// Returns the relays 1 to `relays` without `gone`.
+fn left(relays: u16, gone: &[u16]) -> Vec<u16> {
+    (1..=relays).filter(|relay| !gone.contains(relay)).collect()
+}
+
 /// Checks that one of two spares joins for one departure, also if this spare becomes the leader.
 #[test]
 fn one_spare_joins_for_one_departure() {

@@ -106,11 +106,11 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
         upload(2, mission),
         of(
             "Pulse",
-            json!({ "lease_ds": 150, "in_place": false, "nodes": null }),
+            json!({ "lease_ds": 150, "in_place": false, "leavers": [], "joiners": [] }),
         ),
         of(
             "Pulsed",
-            json!({ "endurance_s": 0, "in_place": false, "nodes": null, "done": true }),
+            json!({ "in_place": false, "done": true, "requests": [], "spares": [] }),
         ),
         of("Sense", heard.clone()),
         of("Sensed", heard),

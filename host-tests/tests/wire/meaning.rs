@@ -9,9 +9,9 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::message::{
-    AdjustStep, Claim, Coarse, Decision, Detail, Entry, Heard, Hello, Message, Moved, Orders,
-    OwnSeat, Poll, Proposal, Pulse, Pulsed, Reports, Requests, Roster, Successor, Sweep,
-    SweepVerdict, Token,
+    AT_ONCE, AdjustStep, Claim, Coarse, Decision, Detail, Entry, Heard, Hello, Leave, Message,
+    Moved, Nodes, Orders, OwnSeat, Poll, Proposal, Pulse, Pulsed, Reports, Requests, Roster,
+    Successor, Sweep, SweepVerdict, Token,
 };
 use uav_relay::{Interference, Local, Placement, Sites, Upload, View, ViewId};
 use uav_relay_decode::value::{Fields, Value};
@@ -253,30 +253,62 @@ fn reports(of: &MessageFields<'_>) -> Reports {
     report
 }
 
+/// Returns the elements of the list `name`, padded with `none`.
+fn padded<T: Copy>(
+    of: &MessageFields<'_>,
+    name: &str,
+    none: T,
+    one: impl Fn(&Value<'static>) -> T,
+) -> [T; AT_ONCE] {
+    let Some(Value::List(values)) = of.0.get(name) else {
+        panic!("no {name}");
+    };
+    let mut all = [none; AT_ONCE];
+    for (place, value) in all.iter_mut().zip(values) {
+        *place = one(value);
+    }
+    all
+}
+
+fn nodes(of: &MessageFields<'_>, name: &str) -> Nodes {
+    padded(of, name, 0, |node| match node {
+        Value::Unsigned(node) => u16::try_from(*node).unwrap(),
+        other => panic!("{other:?}"),
+    })
+}
+
 fn pulse(of: &MessageFields<'_>) -> Pulse {
-    let nodes = of.group("nodes");
     Pulse {
         number: of.word("number"),
         view_digest: of.word("view_digest"),
         lease: of.word("lease_ds"),
         orders: Orders {
-            leaver: nodes.as_ref().map_or(0, |of| of.word("leaver")),
-            joiner: nodes.as_ref().map_or(0, |of| of.word("joiner")),
+            leavers: nodes(of, "leavers"),
+            joiners: nodes(of, "joiners"),
             in_place: of.flag("in_place", 0),
         },
     }
 }
 
 fn pulsed(of: &MessageFields<'_>) -> Pulsed {
-    let nodes = of.group("nodes");
+    let leave = |request: &Value<'static>| match request {
+        Value::Group(fields) => Leave {
+            node: MessageFields(fields).word("relay"),
+            endurance_s: MessageFields(fields).word("endurance_s"),
+        },
+        other => panic!("{other:?}"),
+    };
+    let none = Leave {
+        node: 0,
+        endurance_s: 0,
+    };
     Pulsed {
         number: of.word("number"),
         view_digest: of.word("view_digest"),
         done: of.flag("done", 0),
         requests: Requests {
-            leaver: nodes.as_ref().map_or(0, |of| of.word("leaver")),
-            endurance_s: of.word("endurance_s"),
-            spare: nodes.as_ref().map_or(0, |of| of.word("spare")),
+            leaves: padded(of, "requests", none, leave),
+            spares: nodes(of, "spares"),
             in_place: of.flag("in_place", 0),
         },
     }

@@ -24,7 +24,7 @@ use crate::settings::{Settings, Wiring};
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::message::{Hello, Orders, Requests};
+use crate::wire::message::{Hello, Leave, Orders, OwnRequests, used};
 
 /// Maximum deviation in each of x, y and altitude at which a drone counts as in place, m. In place means at its agreed
 /// position, or as near to it as the guard permits beside a lost drone.
@@ -191,7 +191,7 @@ impl Layers {
             Some(Departure::NeedsChannel)
         } else if settings.guard.is_none() && !settings.leave_without_guard {
             Some(Departure::NeedsGuard)
-        } else if !member.keeps_quorum_without(*node) {
+        } else if !member.keeps_quorum_without(&[*node]) {
             Some(Departure::NeedsQuorum)
         } else if before != 0 && after != 0 && width > CANDIDATES {
             Some(Departure::WideGap)
@@ -218,10 +218,22 @@ impl Layers {
                 Some(Departure::NeedsQuorum) => self.lease.knows_spare(),
                 refused => refused.is_none(),
             };
-        let ordered = self.lease.orders().leaver == member.node;
-        let requests = Requests {
-            leaver: if leaves { member.node } else { 0 },
-            endurance_s: if ordered || !leaves { 0 } else { endurance_s },
+        let ordered = self.lease.orders().leavers.contains(&member.node);
+        let leave = Leave {
+            node: member.node,
+            endurance_s: if ordered { 0 } else { endurance_s },
+        };
+        let requests = OwnRequests {
+            node: member.node,
+            gap: match self
+                .neighbours
+                .at(Side::onward(member.mission.heading()))
+                .node()
+            {
+                0 => CANDIDATES,
+                next => next.abs_diff(member.node),
+            },
+            leave: if leaves { leave } else { Leave::NONE },
             spare: self.leaving.spare(now, &member.settings),
             in_place: self.leaving.is_in_place(),
         };
@@ -423,7 +435,7 @@ impl Node {
             let distance = to.abs_diff(self.member.node);
             neighbour.is_agreed() && neighbour.selected_by(distance) == 0
         } else {
-            lease.orders().joiner == to
+            lease.orders().joiners.contains(&to)
                 && self.is_beside(side, to)
                 && (neighbour.is_mutual() || neighbour.has_no_peer())
                 && !self.steering.has_lost(side)
@@ -475,19 +487,18 @@ impl Node {
             self.schedule_hello(side, node, false);
         }
         for side in [Side::Upstream, Side::Downstream] {
-            if orders.joiner != 0
-                && self.side_of(orders.joiner) == Some(side)
-                && self.is_beside(side, orders.joiner)
-            {
-                self.schedule_hello(side, orders.joiner, true);
+            for joiner in used(&orders.joiners) {
+                if self.side_of(joiner) == Some(side) && self.is_beside(side, joiner) {
+                    self.schedule_hello(side, joiner, true);
+                }
             }
             let neighbour = self.layers.neighbours.at(side);
             let node = neighbour.node();
             // The neighbour's hello that it has selected the relay beyond may be lost.
             let asks = self.layers.leaving.ordered_at.is_some()
-                && orders.leaver == self.member.node
+                && orders.leavers.contains(&self.member.node)
                 && !neighbour.has_no_peer();
-            let leaves = orders.leaver != 0 && node == orders.leaver && neighbour.is_agreed();
+            let leaves = node != 0 && orders.leavers.contains(&node) && neighbour.is_agreed();
             if asks {
                 self.schedule_hello(side, node, true);
             }
@@ -504,7 +515,8 @@ impl Node {
         let Member { node, settings, .. } = &self.member;
         let leaving = &mut self.layers.leaving;
         let waits = leaving.requested && !leaving.is_outside();
-        let names_relay = orders.leaver != 0 || orders.joiner != 0;
+        let [[leaver, ..], [joiner, ..]] = [orders.leavers, orders.joiners];
+        let names_relay = leaver != 0 || joiner != 0;
         if !waits && !names_relay {
             leaving.repeat_at = Instant::ZERO;
             if leaving.is_spare() {
@@ -513,11 +525,11 @@ impl Node {
         } else if leaving.repeat_at <= now {
             leaving.repeat_at = now + settings.hop_time.times(REPEATED_AFTER);
         }
-        if orders.leaver == *node && leaving.requested {
+        if orders.leavers.contains(node) && leaving.requested {
             let blocked = settings.dead_after.times(2 * BLOCKED_AFTER);
             let at = leaving.ordered_at.filter(|at| now.since(*at) < blocked);
             leaving.ordered_at = Some(at.unwrap_or(now));
-        } else if orders.leaver != 0 {
+        } else if leaver != 0 {
             leaving.end_order();
         }
     }
@@ -618,9 +630,9 @@ impl Node {
         } else if self.is_beside(side, from) && !self.steering.has_lost(side) {
             // Beside a lost drone that may still hover, a spare could fly into it. Of several spares the called one
             // counts, else the one that was received first.
-            let called = self.layers.lease.orders().joiner;
+            let called = self.layers.lease.orders().joiners.contains(&from);
             let known = self.layers.leaving.spare(now, &self.member.settings);
-            if [0, from].contains(&known) || called == from {
+            if called || [0, from].contains(&known) {
                 self.layers.leaving.heard_spare = Some((from, now));
             }
         }
@@ -641,7 +653,7 @@ impl Node {
         {
             *at = now;
         }
-        let ordered = self.layers.lease.orders().leaver == own && leaving.requested;
+        let ordered = self.layers.lease.orders().leavers.contains(&own) && leaving.requested;
         if is_neighbour && let Some(replaced) = leaving.replaced.get_mut(side as usize) {
             *replaced = hello.neighbour != own;
         }

@@ -243,11 +243,8 @@ impl Node {
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);
-        let leaver = if DEPARTURES {
-            self.layers.lease.orders().leaver
-        } else {
-            0
-        };
+        let leavers = self.layers.lease.orders().leavers;
+        let is_leaver = |node: u16| DEPARTURES && node != 0 && leavers.contains(&node);
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
         neighbour.record_unselected(now, settings);
@@ -255,15 +252,13 @@ impl Node {
         let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
         let before = neighbour.node();
         // The node beyond a neighbour that is ordered to leave, once that one has received the fence beside it.
-        let passes = leaver != 0
-            && leaver == before
-            && [own, leaver].contains(&hello.neighbour)
+        let passes = is_leaver(before)
+            && [own, before].contains(&hello.neighbour)
             && (side == Side::Upstream
                 || self.steering.known_guard().is_none_or(Guard::is_answered));
         let taken = hello.neighbour != own && hello.neighbour != 0 && !farther && !passes;
         // A neighbour that this relay has passed asks for a hello until it knows: it is not selected again.
-        let leaves = leaver != 0 && leaver == from;
-        if taken || leaves || !hello.is_heard(from, own) {
+        if taken || is_leaver(from) || !hello.is_heard(from, own) {
             return;
         }
         let pairs = hello.neighbour == own;

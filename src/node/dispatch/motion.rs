@@ -40,11 +40,19 @@ impl Node {
             respacing(&self.member.settings)
         };
         // The order comes first: a relay that also requests to leave closes up to the relay that leaves now.
-        let leaver = match self.layers.lease.orders().leaver {
-            0 if self.departure_granted().is_some() && !self.steering.is_moving() => {
+        let leavers = self.layers.lease.orders().leavers;
+        let next = self.layers.neighbours.at(Side::Downstream).node();
+        let leaver = match leavers {
+            [0, ..] if self.departure_granted().is_some() && !self.steering.is_moving() => {
                 self.member.node
             }
-            ordered => ordered,
+            // The guard only asks if this relay or the next one leaves.
+            [first, ..] => {
+                let beside = [self.member.node, next];
+                let beside = beside.into_iter().filter(|node| *node != 0);
+                let mut beside = beside.filter(|node| leavers.contains(node));
+                beside.next().unwrap_or(first)
+            }
         };
         self.steering.set_leaver(leaver);
         // All relays know the turn of the first renewal by then.

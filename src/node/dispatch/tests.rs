@@ -512,7 +512,7 @@ fn an_order_to_leave_comes_before_the_relays_own_request() {
     assert_eq!(node.departure_granted(), Some(false));
     for (ordered, expected) in [(0, 2), (3, 3), (2, 2), (0, 2)] {
         node.layers.lease.set_orders(Orders {
-            leaver: ordered,
+            leavers: [ordered, 0, 0, 0],
             ..Orders::NONE
         });
         node.steer(NOW);
@@ -587,7 +587,7 @@ fn a_relay_with_a_lease_and_neighbours_calls_a_spare() {
     node.layers.lease.set_until(NOW);
     assert!(calls(&node));
     node.layers.lease.set_orders(Orders {
-        joiner: 4,
+        joiners: [0, 4, 0, 0],
         ..Orders::NONE
     });
     for ends in [false, true] {
@@ -599,7 +599,7 @@ fn a_relay_with_a_lease_and_neighbours_calls_a_spare() {
     }
     node.layers.lease.end();
     node.layers.lease.set_orders(Orders {
-        joiner: 4,
+        joiners: [0, 4, 0, 0],
         ..Orders::NONE
     });
     assert!(!calls(&node));

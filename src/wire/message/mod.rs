@@ -19,7 +19,10 @@ pub use self::report::{Coarse, Detail, Entry, Reports};
 pub use self::round::{
     AdjustStep, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, SweepVerdict, Token,
 };
-pub use self::view::{Decision, Orders, Poll, Proposal, Pulse, Pulsed, Requests, Successor};
+pub use self::view::{
+    AT_ONCE, Decision, Leave, Nodes, Orders, Poll, Proposal, Pulse, Pulsed, Requests, Successor,
+};
+pub(crate) use self::view::{OwnRequests, push, used};
 
 use self::parts::{PassId, Word, read, tag, write};
 use super::upload::Upload;

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::mission::MAX_RELAYS;
+use crate::node::neighbour::hearing::CANDIDATES;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, take, write};
@@ -279,26 +280,71 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader: to a relay that is allowed to leave, and to a relay that joins. Each lease renewal contains
+/// Maximum number of relays that are ordered to leave, or called to join, at the same time.
+pub const AT_ONCE: usize = 4;
+
+/// Node numbers in one message. Unused places are 0, and at the end.
+pub type Nodes = [u16; AT_ONCE];
+
+/// Orders of the leader: to relays that are allowed to leave, and to relays that join. Each lease renewal contains
 /// these orders.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
-    /// Node that is allowed to leave the chain, 0 for none. The two neighbours of this node then select each other as
-    /// neighbours.
-    pub leaver: u16,
-    /// Node outside of the chain that is called to join it, 0 for none.
-    pub joiner: u16,
+    /// Nodes that are allowed to leave the chain. The two neighbours of each node then select each other as
+    /// neighbours. Between two of these nodes are at least two relays that stay.
+    pub leavers: Nodes,
+    /// Nodes outside of the chain that are called to join it, at most one for each gap between two relays.
+    pub joiners: Nodes,
     /// True if all relays of the view were at their positions when the previous renewal completed.
     pub in_place: bool,
 }
 
 impl Orders {
     pub(crate) const NONE: Self = Self {
-        leaver: 0,
-        joiner: 0,
+        leavers: [0; AT_ONCE],
+        joiners: [0; AT_ONCE],
         in_place: false,
     };
+}
+
+/// Request of a relay to leave the chain.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Leave {
+    /// Node that needs to leave the chain, 0 for none.
+    pub node: u16,
+    /// Remaining endurance of the node, s; 65535 if unknown, 0 if the node has the order to leave.
+    pub endurance_s: u16,
+}
+
+impl Leave {
+    pub(crate) const NONE: Self = Self {
+        node: 0,
+        endurance_s: 0,
+    };
+
+    /// Returns a number that is lower for a more urgent request.
+    const fn rank(self) -> u32 {
+        match self.node {
+            0 => u32::MAX,
+            node => (self.endurance_s as u32) << 16 | node as u32,
+        }
+    }
+}
+
+/// Requests of one relay to the leader.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OwnRequests {
+    /// Number of the relay.
+    pub(crate) node: u16,
+    /// Difference between the numbers of this relay and of the next one in the direction away from the leader. At most
+    /// the largest difference of neighbours if the next relay is unknown.
+    pub(crate) gap: u16,
+    pub(crate) leave: Leave,
+    /// Spare that is ready to join the chain, 0 for none.
+    pub(crate) spare: u16,
+    pub(crate) in_place: bool,
 }
 
 /// Requests to the leader by relays that need to leave the chain or are ready to join it. They come from all relays
@@ -306,47 +352,91 @@ impl Orders {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
-    /// Node that needs to leave the chain most urgently, 0 for none.
-    pub leaver: u16,
-    /// Remaining endurance of the node `leaver`, s; 65535 if unknown, 0 if it has the order to leave.
-    pub endurance_s: u16,
-    /// Spare that is ready to join the chain: the number of a node outside of the chain, 0 for none.
-    pub spare: u16,
+    /// Requests to leave, the most urgent one first. Between two of the nodes are at least two other relays.
+    pub leaves: [Leave; AT_ONCE],
+    /// Spares that are ready to join the chain: nodes outside of it, at most one for each gap between two relays.
+    pub spares: Nodes,
     /// True if the chain's last relay, the sender, and all relays between them are at their positions.
     pub in_place: bool,
 }
 
 impl Requests {
     pub(crate) const NONE: Self = Self {
-        leaver: 0,
-        endurance_s: 0,
-        spare: 0,
+        leaves: [Leave::NONE; AT_ONCE],
+        spares: [0; AT_ONCE],
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. The more urgent departure is kept.
+    /// Returns these requests of the relays farther from the leader, with those of the next relay, `own`.
     ///
-    /// If both parts have a spare, the one that is `called` is kept, or else that of the part with the more urgent
-    /// departure. If no part has a departure, the spare with the lower number is kept.
-    pub(crate) fn merge(self, other: Self, called: u16) -> Self {
-        let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
-        let urgent = if urgency(&other) < urgency(&self) {
-            other
-        } else {
-            self
+    /// Of two relays that want to leave and are too near to each other, the more urgent one is kept. The spares that
+    /// are `called` come first, then that of the relay with the most urgent request. Without a request the spare of
+    /// `own` comes first if its number is lower. Of two spares in a gap the first one is kept.
+    pub(crate) fn with(&self, own: &OwnRequests, called: &Nodes) -> Self {
+        let mut all = Self {
+            in_place: self.in_place && own.in_place,
+            ..Self::NONE
         };
-        let spare = match (self.spare, other.spare) {
-            (0, spare) | (spare, 0) => spare,
-            (one, other) if [one, other].contains(&called) => called,
-            _ if urgent.leaver != 0 => urgent.spare,
-            (one, other) => one.min(other),
+        let apart = |node: u16| node.abs_diff(own.node);
+        // The second relay from here is no farther away.
+        let near = own.gap + CANDIDATES;
+        let is_near = |it: &Leave| it.node != 0 && apart(it.node) <= near;
+        let rank = own.leave.rank();
+        let mut rivals = self.leaves.iter().filter(|it| is_near(it));
+        let wins = rivals.all(|it| rank < it.rank());
+        let mut insert = |mut leave: Leave| {
+            for place in &mut all.leaves {
+                if leave.rank() < place.rank() {
+                    core::mem::swap(place, &mut leave);
+                }
+            }
         };
-        Self {
-            spare,
-            in_place: self.in_place && other.in_place,
-            ..urgent
+        if wins {
+            insert(own.leave);
         }
+        for it in &self.leaves {
+            if !(wins && is_near(it)) {
+                insert(*it);
+            }
+        }
+        let [leave, ..] = self.leaves;
+        let [spare, ..] = self.spares;
+        let first = match rank.min(leave.rank()) {
+            u32::MAX => own.spare < spare,
+            least => rank == least,
+        };
+        let own_spare = [own.spare];
+        let (one, other) = if first {
+            (&own_spare[..], &self.spares[..])
+        } else {
+            (&self.spares[..], &own_spare[..])
+        };
+        for is_called in [true, false] {
+            for spare in one.iter().chain(other) {
+                let is_beside = |it: &u16| {
+                    let same = (*it > own.node) == (*spare > own.node);
+                    *it == *spare || same && apart(*it).max(apart(*spare)) < own.gap
+                };
+                let mut known = all.spares.iter().take_while(|it| **it != 0);
+                if *spare != 0 && called.contains(spare) == is_called && !known.any(is_beside) {
+                    push(&mut all.spares, *spare);
+                }
+            }
+        }
+        all
     }
+}
+
+/// Writes `node` to the first unused place of `nodes`, if there is one.
+pub(crate) fn push(nodes: &mut Nodes, node: u16) {
+    if let Some(place) = nodes.iter_mut().find(|place| **place == 0) {
+        *place = node;
+    }
+}
+
+/// Returns the node numbers of `nodes` without unused places.
+pub(crate) fn used(nodes: &Nodes) -> impl Iterator<Item = u16> {
+    nodes.iter().copied().take_while(|node| *node != 0)
 }
 
 /// Acknowledgement of a lease renewal; sent back from relay to relay to the leader.
@@ -363,69 +453,87 @@ pub struct Pulsed {
     pub requests: Requests,
 }
 
-/// Common part of a lease renewal and of its acknowledgement. One decoder for both keeps the image small.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-struct RenewalBody {
-    pass: PassId,
-    number: Word,
-    in_place: bool,
-    /// Numbers of two nodes: leaving node in the lower half, joining node in the upper half of a u32. `None` if both
-    /// numbers are 0.
-    nodes: Option<[u8; 4]>,
+/// Encodes `list` at the index `at` of `buffer`: the number of elements, and the elements. Returns the index of the end.
+///
+/// An element is a node number and further numbers. The first unused place, with the node number 0, ends the list.
+fn append<const W: usize>(
+    list: &[[u16; W]; AT_ONCE],
+    at: usize,
+    buffer: &mut [u8],
+) -> Option<usize> {
+    let (count, mut rest) = buffer.get_mut(at..)?.split_first_mut()?;
+    let mut end = at + 1;
+    *count = 0;
+    for item in list.iter().take_while(|item| item.first() != Some(&0)) {
+        for number in item {
+            let (to, after) = rest.split_first_chunk_mut()?;
+            *to = number.to_le_bytes();
+            rest = after;
+            end += 2;
+        }
+        *count += 1;
+    }
+    Some(end)
 }
 
-impl RenewalBody {
-    fn new(pass: PassId, number: u16, in_place: bool, [leaver, joiner]: [u16; 2]) -> Self {
-        let nodes = u32::from(joiner) << 16 | u32::from(leaver);
-        Self {
-            pass,
-            number: Word::new(number),
-            in_place,
-            nodes: (nodes != 0).then(|| nodes.to_le_bytes()),
+/// Decodes a list that [`append`] has encoded; returns the list and the remaining bytes. A node number of 0 becomes an
+/// invalid one, because it would end the list.
+///
+/// # Errors
+/// [`MessageError::Encoding`] if there are too many elements or too few bytes.
+fn take_list<const W: usize>(bytes: &[u8]) -> Result<([[u16; W]; AT_ONCE], &[u8]), MessageError> {
+    let (count, mut rest) = bytes.split_first().ok_or(MessageError::Encoding)?;
+    let mut list = [[0; W]; AT_ONCE];
+    let places = list.get_mut(..usize::from(*count));
+    for item in places.ok_or(MessageError::Encoding)? {
+        for number in &mut *item {
+            let (word, after) = rest.split_first_chunk().ok_or(MessageError::Encoding)?;
+            *number = u16::from_le_bytes(*word);
+            rest = after;
+        }
+        if let Some(node @ 0) = item.first_mut() {
+            *node = u16::MAX;
         }
     }
+    Ok((list, rest))
+}
 
-    /// Returns the numbers of the leaving node and the joining node, 0 for none.
-    ///
-    /// # Errors
-    /// [`MessageError::Value`] if a number is above 1000, or if both numbers are 0 but `nodes` is not `None`.
-    fn nodes(&self) -> Result<[u16; 2], MessageError> {
-        let Some([a, b, c, d]) = self.nodes else {
-            return Ok([0; 2]);
-        };
-        let nodes = [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])];
-        require(nodes != [0; 2] && nodes.iter().all(|node| *node <= MAX_RELAYS))?;
-        Ok(nodes)
-    }
+/// Returns true if the list contains only valid node numbers.
+fn is_valid<const W: usize>(list: &[[u16; W]; AT_ONCE]) -> bool {
+    let mut nodes = list.iter().filter_map(|item| item.first());
+    nodes.all(|node| *node <= MAX_RELAYS)
 }
 
 impl Pulse {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
         let Orders {
-            leaver,
-            joiner,
+            leavers,
+            joiners,
             in_place,
         } = self.orders;
-        let common = RenewalBody::new(pass, self.lease, in_place, [leaver, joiner]);
-        write(&(tag::PULSE, common), buffer)
+        let body = (tag::PULSE, pass, Word::new(self.lease), in_place);
+        let end = write(&body, buffer)?;
+        let end = append(&leavers.map(|node| [node]), end, buffer)?;
+        append(&joiners.map(|node| [node]), end, buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (common, []) = take::<RenewalBody>(body)? else {
+        let ((pass, lease, in_place), rest): ((PassId, Word, bool), _) = take(body)?;
+        let (leavers, rest) = take_list(rest)?;
+        let (joiners, []) = take_list(rest)? else {
             return Err(MessageError::Encoding);
         };
-        let [leaver, joiner] = common.nodes()?;
-        let lease = common.number.number();
-        require(lease != 0)?;
+        let lease = lease.number();
+        require(lease != 0 && is_valid(&leavers) && is_valid(&joiners))?;
         Ok(Self {
-            number: common.pass.number(),
-            view_digest: common.pass.digest(),
+            number: pass.number(),
+            view_digest: pass.digest(),
             lease,
             orders: Orders {
-                leaver,
-                joiner,
-                in_place: common.in_place,
+                leavers: leavers.map(|[node]| node),
+                joiners: joiners.map(|[node]| node),
+                in_place,
             },
         })
     }
@@ -435,32 +543,31 @@ impl Pulsed {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
         let Requests {
-            leaver,
-            endurance_s,
-            spare,
+            leaves,
+            spares,
             in_place,
         } = self.requests;
-        let common = RenewalBody::new(pass, endurance_s, in_place, [leaver, spare]);
-        write(&(tag::PULSED, common, self.done), buffer)
+        let end = write(&(tag::PULSED, pass, in_place, self.done), buffer)?;
+        let leaves = leaves.map(|leave| [leave.node, leave.endurance_s]);
+        let end = append(&leaves, end, buffer)?;
+        append(&spares.map(|node| [node]), end, buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (common, done) = take::<RenewalBody>(body)?;
-        let done = match done {
-            [0] => false,
-            [1] => true,
-            _ => return Err(MessageError::Encoding),
+        let ((pass, in_place, done), rest): ((PassId, bool, bool), _) = take(body)?;
+        let (leaves, rest) = take_list(rest)?;
+        let (spares, []) = take_list(rest)? else {
+            return Err(MessageError::Encoding);
         };
-        let [leaver, spare] = common.nodes()?;
+        require(is_valid(&leaves) && is_valid(&spares))?;
         Ok(Self {
-            number: common.pass.number(),
-            view_digest: common.pass.digest(),
+            number: pass.number(),
+            view_digest: pass.digest(),
             done,
             requests: Requests {
-                leaver,
-                endurance_s: common.number.number(),
-                spare,
-                in_place: common.in_place,
+                leaves: leaves.map(|[node, endurance_s]| Leave { node, endurance_s }),
+                spares: spares.map(|[node]| node),
+                in_place,
             },
         })
     }

@@ -123,6 +123,7 @@ fn item(row: &Row, all: &[Table<'_>]) -> Result<Kind, String> {
     let head = match row.kind.as_str() {
         "seats" => "offset in the seat",
         "entries" => "offset in the entry",
+        "requests" => "offset in the request",
         other => return plain(other),
     };
     let table = all.iter().find(|table| table.head.first() == Some(&head));

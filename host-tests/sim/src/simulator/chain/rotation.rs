@@ -1,6 +1,7 @@
 //! Replacement of drones whose batteries run low: pilots, spares, returns, and the measured SIR.
 
 use rand::RngExt;
+use uav_relay::wire::message::AT_ONCE;
 use uav_relay::{Departure, Duration, HoldReason, Instant, Relay, Side};
 
 use super::{Chain, ChangedRelays, QueuedEvent, undisturbed};
@@ -119,7 +120,7 @@ impl Chain {
             next: Instant::ZERO,
             pilots_at: Instant::ZERO,
             last_take_off: Instant::ZERO,
-            slot_s: 90.0,
+            slot_s: SLOT_S,
             spacing_m: (separation_m + 2.0 * (spec.bias_m + spec.noise_m) + 2.0).max(8.0),
             record: Rotated::default(),
         };
@@ -607,8 +608,17 @@ impl Chain {
             }
         }
         tired.sort_by(|one, other| one.1.total_cmp(&other.1));
-        // Latest time of each request. Departures follow each other, and with n spares the n-th next departure needs the
-        // drone that this departure frees: after its way home, its time on the ground and its way out.
+        // The latest time of each request. Departures follow each other. In a long chain several drones depart in one slot,
+        // if they are far enough apart. With n spares the n-th next departure needs the drone that this departure frees:
+        // after its way home, its time on the ground and its way out.
+        let at_once = (usize::from(rotation.spec.flying) / APART).clamp(1, AT_ONCE);
+        let (slot_s, queue_s) = match at_once {
+            1 => (rotation.slot_s, 0.0),
+            _ => (
+                SLOT_S / at_once as f64,
+                QUEUE_S.min(0.1 * rotation.spec.endurance_s),
+            ),
+        };
         let all = usize::from(self.setup.mission.relays());
         let spares = all.saturating_sub(usize::from(rotation.spec.flying)).max(1);
         let distance_m = f64::from(self.setup.mission.config().distance_m);
@@ -623,11 +633,11 @@ impl Chain {
                     .len()
                     .checked_sub(count)
                     .and_then(|at| starts.get(at));
-                later.map_or(f64::INFINITY, |(_, start_s, _)| *start_s)
+                later.map_or(f64::INFINITY, |(_, start_s, _)| start_s + queue_s)
             };
-            let latest_s = left_s.min(after_s(1)) - rotation.slot_s;
+            let latest_s = left_s.min(after_s(1)) - slot_s;
             let latest_s = latest_s.min(after_s(spares) - cycle_s);
-            starts.push((*index, latest_s, *left_s));
+            starts.push((*index, latest_s - queue_s, *left_s));
         }
         starts.reverse();
         let serving = starts.len();
@@ -635,7 +645,8 @@ impl Chain {
         let standby = rotation.drones.iter().filter(|it| it.duty == Duty::Standby);
         let (waiting, moving): (Vec<_>, Vec<_>) =
             standby.partition(|it| now.since(it.hovers_since) >= HOVERS);
-        let spares = if moving.is_empty() { waiting.len() } else { 0 };
+        let ready = moving.is_empty() || at_once > 1;
+        let spares = if ready { waiting.len() } else { 0 };
         // Spares that the chain needs in any case are not there for a departure.
         let present = self.members.iter().zip(&rotation.drones);
         let present = present.filter(|(member, drone)| {
@@ -658,9 +669,10 @@ impl Chain {
                 continue;
             }
             requests += usize::from(drone.requested.is_some());
+            let deadline_s = DEADLINE * if at_once > 1 { SLOT_S } else { slot_s };
+            let is_due = left_s <= deadline_s || start_s <= MARGIN_S && spares > requests;
             let is_due =
-                left_s <= rotation.slot_s * DEADLINE || start_s <= MARGIN_S && spares > requests;
-            let is_due = is_due && at < 2 && rotation.record.complete_at.is_some();
+                is_due && at < (at_once * at_once).max(2) && rotation.record.complete_at.is_some();
             if drone.requested.is_none() && is_due {
                 drone.requested = Some(now);
                 requests += 1;
@@ -902,6 +914,16 @@ impl Chain {
         }
     }
 }
+
+/// Number of relays of a chain for each drone that departs at the same time.
+const APART: usize = 6;
+
+/// Time of a replacement, s, as far as a pilot knows it before the first one.
+const SLOT_S: f64 = 90.0;
+
+/// Time, s, by which requests to leave are earlier in a chain in which several drones depart at the same time. The
+/// leader then has several to choose from, and selects those that are far enough apart.
+const QUEUE_S: f64 = 270.0;
 
 /// Time, s, for which a drone without permission stays after it should have started home. Then it flies home without
 /// permission.
