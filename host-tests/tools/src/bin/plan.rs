@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns the options, with `--uavs` from `fleet.flying` of the scenario if the request names neither number nor target.
+/// Returns the options, with `--uavs` from `fleet.flying` of the scenario if nothing is requested.
 fn settled(mut options: Options) -> Result<Options, Failure> {
     let Wanted {
         uavs,
