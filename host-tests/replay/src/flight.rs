@@ -147,7 +147,6 @@ impl Flight {
             duration,
             period,
             relays,
-            flying: self.loaded.and_then(|it| it.flying),
             ..Self::default()
         };
         let reports = reports(frames, begin, relays);
@@ -392,6 +391,7 @@ impl<'a> Recorder<'a> {
             mission: uploaded.as_ref().or(base.map(|it| &it.mission)),
             end: self.end,
             relays,
+            flying: self.loaded.and_then(|it| it.flying),
             profiles: self.loaded.map_or(&[], |it| it.profiles.as_slice()),
             is_estimated: false,
             axis: uploaded_axis

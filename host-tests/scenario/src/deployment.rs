@@ -183,7 +183,9 @@ impl Deployment {
         Some(FleetSize { relays, flying })
     }
 
-    /// Returns the error `problem` of the key `fleet.flying`, or of `network.relays` without that key.
+    /// Returns the error `problem` of the number of relays in the chain.
+    ///
+    /// Its key is `fleet.flying`, or `network.relays` if `fleet.flying` is not given.
     fn size_error(&self, file: &str, problem: Problem, allowed: String) -> ScenarioError {
         let (key, value) = match self.fleet.flying {
             Some(flying) => ("fleet.flying", Some(flying)),

@@ -251,7 +251,9 @@ pub struct StationView {
     /// Alarms count a relay's silence from this time or later.
     resumed_at: Instant,
     rejected_at: Option<Instant>,
-    /// Number of relays in the chain and since when it is too small and has not risen; `None` if enough.
+    /// Number of relays in a chain with too few, and time since which it has not risen.
+    ///
+    /// `None` if enough relays are in the chain.
     short: Option<(u16, Instant)>,
     /// Newest mission version that relays report, and the time when the station first received it.
     version: Option<(u16, Instant)>,

@@ -544,7 +544,7 @@ fn the_alarm_of_another_mission_begins_again() {
     assert_eq!(watched.lasting(), ".");
 }
 
-/// Checks the numbers of relays in a fleet with two spares, and the alarm of too few relays.
+/// Checks the numbers of relays in a fleet with two spares, and the alarm about too few.
 #[test]
 fn too_few_relays_in_the_chain_are_an_alarm() {
     let mut watched = Watched {

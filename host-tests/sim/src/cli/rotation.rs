@@ -15,7 +15,8 @@ pub struct Rotation {
     /// first. Replaces --uavs; the drones have no autopilots
     #[arg(long, value_name = "N", requires = "fly", requires = "soak", conflicts_with_all = ["takeover", "start", "wires", "uavs", "kill", "boot"], value_parser = whole(2_u16, 1000))]
     pub fleet: Option<u16>,
-    /// Number of drones meant to fly, above half of the fleet; default fleet.flying of the scenario, or all
+    /// Number of drones that are meant to fly, more than half of the fleet. Default fleet.flying of the scenario,
+    /// or the fleet
     #[arg(long, value_name = "N", requires = "fleet", value_parser = whole(1_u16, 1000))]
     pub flying: Option<u16>,
     /// Time that a full battery lasts in hover, s, 300 to 1e5; default 1500. Each battery differs by up to 5 %

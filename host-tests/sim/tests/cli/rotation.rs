@@ -30,7 +30,7 @@ fn a_fleet_of_twelve_replaces_its_tired_drones() {
     }
 }
 
-/// Checks that `fleet.flying` of a scenario has the effect of `--flying`; its error names the key.
+/// Checks that `fleet.flying` of a scenario has the effect of `--flying`, and an error names it.
 #[test]
 fn a_scenario_says_how_many_relays_fly() {
     let file = tempfile::NamedTempFile::new().unwrap();

@@ -37,9 +37,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns the options, with `--uavs` from the scenario's `fleet.flying`.
-///
-/// The scenario's number counts only if the request has neither `--uavs` nor a target.
+/// Returns the options, with `--uavs` from `fleet.flying` of the scenario if nothing is requested.
 fn settled(mut options: Options) -> Result<Options, Failure> {
     let Wanted {
         uavs,

@@ -314,7 +314,9 @@ pub struct FleetReport {
 }
 
 impl FleetReport {
-    /// Creates the report; `None` without spares, or if the chain has not `planned` relays.
+    /// Creates the report for a plan of `planned` relays.
+    ///
+    /// `None` without spares, or if the chain has another number of relays.
     pub fn new(size: Option<FleetSize>, planned: u16) -> Option<Self> {
         let FleetSize { relays, flying } =
             size.filter(|it| it.flying == planned && it.flying < it.relays)?;

@@ -181,7 +181,7 @@ impl Flight {
         }
     }
 
-    /// Sets the numbers of relays in the fleet and in the chain; `None` if the leader keeps no number.
+    /// Sets the numbers of relays in the fleet and in the chain; `None` for a fleet without spares.
     pub fn with_fleet(self, fleet: Option<FleetSize>) -> Self {
         Self { fleet, ..self }
     }
