@@ -68,7 +68,7 @@ enum LeaseState {
     Lapsed,
 }
 
-/// Number of relays from which on several requests to leave do not wait for the end of a motion before spares join.
+/// Number of relays from which on spares for several departures are called during a motion.
 const LONG: u16 = 16;
 
 /// Last lease renewal that this relay took part in.
