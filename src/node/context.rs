@@ -83,7 +83,7 @@ impl Member {
         node >= 1 && node <= self.all
     }
 
-    /// Returns true if the other relays of the view have a quorum without its members `nodes`, or need none. A node
+    /// Returns true if the view keeps a quorum without its members `nodes`, or needs none. A node
     /// number of 0 does not count.
     pub(crate) fn keeps_quorum_without(&self, nodes: &[u16]) -> bool {
         let relays = self.mission.relays();

@@ -68,6 +68,9 @@ enum LeaseState {
     Lapsed,
 }
 
+/// Number of relays from which on spares for several departures are called during a motion.
+const LONG: u16 = 16;
+
 /// Last lease renewal that this relay took part in.
 #[derive(Clone, Copy, Debug)]
 struct Current {
@@ -313,8 +316,9 @@ impl Lease {
         let joins = spares != [0; AT_ONCE] && relays <= kept && relays < wanted && !late;
         let settled = in_place && self.orders.in_place;
         let is_called = self.orders.joiners != [0; AT_ONCE];
-        // With three requests, the next spares join while the relays still move after the last departures.
-        let is_busy = matches!(requests.leaves, [_, _, third, ..] if third.node != 0);
+        // In a long chain the next spares join while the relays still move after the last departures.
+        let [_, other, ..] = requests.leaves;
+        let is_busy = other.node != 0 && relays >= LONG;
         let at_once = is_called || is_busy || relays < flying(context.settings());
         if joins && (settled || at_once) {
             // The called ones are the first ones.

@@ -467,7 +467,7 @@ fn a_spare_lets_each_of_two_relays_leave() {
     }
 }
 
-/// Returns the setup of a chain of twelve relays in which the relays `leavers` request to leave, while two spares wait.
+/// Returns the setup of a chain of twelve relays: `leavers` request to leave, while two spares wait.
 fn two_replaced(spares: [u16; 2], leavers: [u16; 2]) -> Setup {
     let mut setup = departing(14, &leavers.map(|relay| (relay, None)));
     setup.spares = spares.to_vec();
@@ -483,7 +483,7 @@ const PAIRS: [([u16; 2], [u16; 2]); 4] = [
     ([5, 8], [2, 12]),
 ];
 
-/// Checks that two spares join a chain of twelve relays at the same time, and that two relays then leave it together.
+/// Checks that two spares join a chain of twelve relays together, and that two relays leave together.
 #[test]
 fn two_relays_are_replaced_at_once() {
     for (spares, leavers) in PAIRS {
@@ -518,7 +518,7 @@ fn relays_side_by_side_leave_one_after_the_other() {
     }
 }
 
-/// Checks that the death of one of two spares, or of one of two relays that leave together, is an ordinary loss.
+/// Checks that the death of one of two spares, or of one of two leaving relays, is an ordinary loss.
 ///
 /// The other relay may leave all the same.
 #[test]

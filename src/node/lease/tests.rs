@@ -79,7 +79,7 @@ fn own(node: u16, left_s: Option<u16>) -> OwnRequests {
     }
 }
 
-/// Checks that the most urgent requests are kept, and of two that are too near to each other the more urgent one.
+/// Checks that the most urgent requests are kept, and of two near relays the more urgent one.
 #[test]
 fn the_most_urgent_requests_are_kept() {
     let kept = |wishes: &[(u16, u16)]| {

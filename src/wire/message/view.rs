@@ -338,7 +338,7 @@ impl Leave {
 pub(crate) struct OwnRequests {
     /// Number of the relay.
     pub(crate) node: u16,
-    /// Difference between the numbers of this relay and of the next one in the direction away from the leader. At most
+    /// Difference between the numbers of this relay and of the next one away from the leader. At most
     /// the largest difference of neighbours if the next relay is unknown.
     pub(crate) gap: u16,
     pub(crate) leave: Leave,
@@ -354,7 +354,7 @@ pub(crate) struct OwnRequests {
 pub struct Requests {
     /// Requests to leave, the most urgent one first. Between two of the nodes are at least two other relays.
     pub leaves: [Leave; AT_ONCE],
-    /// Spares that are ready to join the chain: nodes outside of it, at most one for each gap between two relays.
+    /// Spares that are ready to join the chain: at most one for each gap between two relays.
     pub spares: Nodes,
     /// True if the chain's last relay, the sender, and all relays between them are at their positions.
     pub in_place: bool,

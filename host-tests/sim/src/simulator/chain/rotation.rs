@@ -921,7 +921,7 @@ const APART: usize = 6;
 /// Time of a replacement, s, as far as a pilot knows it before the first one.
 const SLOT_S: f64 = 90.0;
 
-/// Time, s, by which requests to leave are earlier in a chain in which several drones depart at the same time. The
+/// Time, s, by which requests to leave are earlier in a chain in which drones depart together. The
 /// leader then has several to choose from, and selects those that are far enough apart.
 const QUEUE_S: f64 = 270.0;
 
