@@ -265,8 +265,8 @@ impl Lease {
     ///
     /// A relay that does not arrive counts as in place after half of the maximum duration of a lease and the duration
     /// of a motion, counted from the first agreement in this view, or from the last time that all were in place. A
-    /// relay with a request to leave waits for spares at most this maximum duration, and at most its remaining
-    /// endurance. So at least half of the endurance at the first request remains.
+    /// relay with the most urgent request waits for spares at most this maximum duration, and at most its remaining
+    /// endurance, and then until all are in place.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -332,8 +332,10 @@ impl Lease {
             let most = relays.saturating_sub(kept).max(1);
             let member = context.member;
             for leave in requests.leaves.iter().take(most.into()) {
-                // The leader leaves alone: the renewals end when it is outside.
-                let alone = [leave.node, urgent.node].contains(&member.node);
+                // Before all are in place, only orders that were given remain. The leader leaves alone: the renewals end
+                // when it is outside.
+                let waits = !settled && !self.orders.leavers.contains(&leave.node);
+                let alone = waits || [leave.node, urgent.node].contains(&member.node);
                 let mut leavers = orders.leavers;
                 push(&mut leavers, leave.node);
                 if (leave.node == urgent.node || !alone) && member.keeps_quorum_without(&leavers) {
@@ -344,11 +346,12 @@ impl Lease {
         orders
     }
 
-    /// Records that this leader has joined a view of `relays` relays as the spare for a departure. Then no second spare
-    /// is called for it.
+    /// Records that this leader has joined a chain of `relays` relays as a spare for a departure.
+    ///
+    /// Then no second spare is called for the departure.
     pub(crate) fn exclude_joined(&mut self, relays: u16) {
         if let Some(known) = self.departures.first_mut() {
-            known.complement = relays.saturating_sub(1);
+            known.complement = relays;
         }
     }
 

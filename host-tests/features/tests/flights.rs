@@ -24,14 +24,14 @@ const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 ///
 /// Only the feature `departures` changes the bytes: it sets a flag in each lease renewal when all relays are in place.
 const SAID_BY_WIRES: u32 = if cfg!(feature = "departures") {
-    0x7b9b_6625
+    0xe059_0429
 } else {
-    0xcbd4_2c1c
+    0xa970_3abd
 };
 const SAID_ON_A_CHANNEL: u32 = if cfg!(feature = "departures") {
-    0x4895_4941
+    0xa680_60ff
 } else {
-    0x42fe_1c67
+    0x36ed_de21
 };
 
 const MINUTE: Duration = Duration::from_millis(60_000);

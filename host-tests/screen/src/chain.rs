@@ -18,7 +18,7 @@ use crate::snapshot::{
 /// Age of a report from which its relay counts as silent.
 ///
 /// With 10 % of all frames lost, reports of eight relays on one channel are 4 s old about once in two minutes, and
-/// none is 5 s old: see the test `only_limits_from_five_seconds_raise_no_false_alarms`.
+/// 5 s old once in several hours of a relay: see the test `silences_of_five_seconds_are_rare`.
 pub const SILENT_AFTER: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
 
 /// Largest difference between the node numbers of two neighbours.

@@ -67,7 +67,10 @@ impl Node {
         }
         self.layers.round.renew(rest, leads, works);
         if self.layers.leaving.on_new_view() && leads {
-            self.layers.lease.exclude_joined(relays);
+            let before = proposed.base.relays;
+            self.layers
+                .lease
+                .exclude_joined(before.min(relays.saturating_sub(1)));
         }
         bump(&mut self.telemetry.stats.views);
         self.telemetry.lapse_reported = false;

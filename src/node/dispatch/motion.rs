@@ -39,21 +39,14 @@ impl Node {
         } else {
             respacing(&self.member.settings)
         };
-        // The order comes first: a relay that also requests to leave closes up to the relay that leaves now.
+        // The order to this relay or the next one comes first: a relay that also requests to leave closes up to the relay
+        // that leaves now. The guard asks about no other relays.
         let leavers = self.layers.lease.orders().leavers;
         let next = self.layers.neighbours.at(Side::Downstream).node();
-        let leaver = match leavers {
-            [0, ..] if self.departure_granted().is_some() && !self.steering.is_moving() => {
-                self.member.node
-            }
-            // The guard only asks if this relay or the next one leaves.
-            [first, ..] => {
-                let beside = [self.member.node, next];
-                let beside = beside.into_iter().filter(|node| *node != 0);
-                let mut beside = beside.filter(|node| leavers.contains(node));
-                beside.next().unwrap_or(first)
-            }
-        };
+        let mut beside = [self.member.node, next].into_iter();
+        let ordered = beside.find(|node| *node != 0 && leavers.contains(node));
+        let requests = self.departure_granted().is_some() && !self.steering.is_moving();
+        let leaver = ordered.unwrap_or(if requests { self.member.node } else { 0 });
         self.steering.set_leaver(leaver);
         // All relays know the turn of the first renewal by then.
         let relays = u32::from(self.member.mission.relays());

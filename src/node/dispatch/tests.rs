@@ -510,7 +510,7 @@ fn an_order_to_leave_comes_before_the_relays_own_request() {
     node.steering.begin(&settings, [Some(1), Some(3)], 1, NOW);
     node.leave(NOW, None);
     assert_eq!(node.departure_granted(), Some(false));
-    for (ordered, expected) in [(0, 2), (3, 3), (2, 2), (0, 2)] {
+    for (ordered, expected) in [(0, 2), (3, 3), (7, 2), (2, 2), (0, 2)] {
         node.layers.lease.set_orders(Orders {
             leavers: [ordered, 0, 0, 0],
             ..Orders::NONE
@@ -587,7 +587,7 @@ fn a_relay_with_a_lease_and_neighbours_calls_a_spare() {
     node.layers.lease.set_until(NOW);
     assert!(calls(&node));
     node.layers.lease.set_orders(Orders {
-        joiners: [0, 4, 0, 0],
+        joiners: [5, 4, 0, 0],
         ..Orders::NONE
     });
     for ends in [false, true] {
@@ -599,7 +599,7 @@ fn a_relay_with_a_lease_and_neighbours_calls_a_spare() {
     }
     node.layers.lease.end();
     node.layers.lease.set_orders(Orders {
-        joiners: [0, 4, 0, 0],
+        joiners: [5, 4, 0, 0],
         ..Orders::NONE
     });
     assert!(!calls(&node));

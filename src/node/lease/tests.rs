@@ -219,6 +219,35 @@ fn a_late_departure_waits_for_the_end_of_a_motion() {
     assert_eq!(ordered(25, 0, false), 2);
 }
 
+/// Checks that no further relay is ordered to leave while relays move. The order that was given remains.
+#[cfg(feature = "departures")]
+#[test]
+fn a_further_departure_waits_for_the_end_of_a_motion() {
+    let settings = Settings {
+        flying: 12,
+        ..Settings::default()
+    };
+    let member = Member::new(Mission::try_new(paper(14)).unwrap(), settings, 1);
+    let mut lease = Lease::new(1, Instant::ZERO, &settings);
+    lease.on_agreement(Instant::ZERO, true);
+    lease.orders.leavers = nodes(&[9]);
+    let mut ordered = |at_s: u64, in_place: bool| {
+        lease.requests = Some(Requests {
+            leaves: leaves(&[(9, 0), (2, 50)]),
+            in_place,
+            ..Requests::NONE
+        });
+        lease.orders = lease.next_orders(&context(&member, at_s));
+        lease.orders.leavers
+    };
+    let reports = [(5, false), (10, true), (15, true)];
+    let expected = [nodes(&[9]), nodes(&[9]), nodes(&[9, 2])];
+    assert_eq!(
+        reports.map(|(at_s, in_place)| ordered(at_s, in_place)),
+        expected
+    );
+}
+
 /// Checks that as many relays leave at once as spares have joined, and that the leader leaves alone.
 #[cfg(feature = "departures")]
 #[test]

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::mission::MAX_RELAYS;
-use crate::node::neighbour::hearing::CANDIDATES;
 use crate::view::{View, ViewId};
+use crate::wire::CANDIDATES;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, take, write};
 

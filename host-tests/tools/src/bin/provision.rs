@@ -125,6 +125,11 @@ impl<'a> Asked<'a> {
             .check_identical(&name, &scenario)
             .map_err(|error| error.to_string())?;
         let fleet = deployment.fleet.flying.and(deployment.fleet_size());
+        if fleet.is_none() && deployment.companion.spare == Some(true) {
+            return Err(format!(
+                "companion.spare = true: would make every relay of {name} a spare; give network.relays and fleet.flying, or leave the key out"
+            ));
+        }
         if fleet.is_some() && options.wires {
             return Err(format!(
                 "--wires: spares join only on a channel that all relays share, and {name} has fleet.flying: leave one of them out"
@@ -230,7 +235,7 @@ impl<'a> Asked<'a> {
         let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, self.network)
             .map_err(|error| format!("{}: {error}", self.name))?;
         let [probe_after, _] = block::silence(self.probe_after_ms);
-        carried(options, self.uavs, probe_after)?;
+        carried(options, self.uavs, self.fleet.is_some(), probe_after)?;
         let flight = match options.speed {
             Some(_) if !flight.has_sites() => {
                 return Err("--speed: is only for a scenario with a [site]".to_owned());
@@ -587,15 +592,22 @@ fn new_key() -> Result<[u8; 32], String> {
 
 /// Checks that the radio channel is fast enough for `uavs` relays. Wires are always fast enough.
 ///
-/// `probe_after` is the silence of a neighbour after which a relay requests heartbeats.
-fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
+/// `probe_after` is the silence of a neighbour after which a relay requests heartbeats. A fleet `has_spares` only on a
+/// channel.
+fn carried(
+    options: &Options,
+    uavs: u16,
+    has_spares: bool,
+    probe_after: Duration,
+) -> Result<(), String> {
     if options.wires {
         return Ok(());
     }
     let in_range = options.in_range.unwrap_or(uavs).min(uavs);
     command::carries(options.baud, ChannelLoad::of_radios(in_range), probe_after).map_err(|error| {
+        let wires = if has_spares { "" } else { ", or --wires for separate links" };
         format!(
-            "{error}; this assumes that all relays receive each other: if not, give --in-range, or --wires for separate links"
+            "{error}; this assumes that all relays receive each other: if not, give --in-range{wires}"
         )
     })
 }

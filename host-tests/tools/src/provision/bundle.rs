@@ -468,12 +468,23 @@ impl Bundle<'_> {
         let named = |relay: Option<u16>, end: &str| {
             relay.map_or_else(|| end.to_owned(), |it| format!("relay {it}"))
         };
+        let is_spare = self.fleet.rank(index).is_none();
         _ = writeln!(
             page,
-            "neighbours: {} and {}\n",
+            "{}: {} and {}\n",
+            if is_spare {
+                "joins between"
+            } else {
+                "neighbours"
+            },
             named(before, "the transmitter"),
             named(after, "the receiver")
         );
+        let place = if is_spare {
+            "flown by hand to a place beside the line, clear of all relays by at least the minimum separation; it waits there until it is called"
+        } else {
+            "flown by hand to its place in the order along the line, between its neighbours"
+        };
         let (more, parameters) = match self.deployment.companion.positions {
             Some(_) => (" --no-autopilot", ""),
             None => (
@@ -490,7 +501,7 @@ impl Bundle<'_> {
              [ ] sudo -u uav-relay linux_companion --check{more} --config /etc/uav-relay/drone.toml\n\
              [ ] all lines green, then: sudo systemctl start uav-relay\n\
              In the air:\n\
-             [ ] flown by hand to its place in the order along the line, between its neighbours\n\
+             [ ] {place}\n\
              [ ] OFFBOARD or GUIDED chosen after the log line `ready`; any other mode takes the drone back\n"
         );
         page

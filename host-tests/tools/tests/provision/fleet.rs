@@ -181,10 +181,28 @@ fn a_bundle_of_a_fleet_marks_its_spares() {
             "relay 4 and the receiver",
             "relay 5 and the receiver",
         ];
-        let line = format!("neighbours: {}\n", beside[index - 1]);
+        let between = if is_spare {
+            "joins between"
+        } else {
+            "neighbours"
+        };
+        let line = format!("{between}: {}\n", beside[index - 1]);
+        assert_eq!(page.contains("a place beside the line"), is_spare, "{page}");
         assert!(
             page.contains(&line) && page.contains("chain of 4 of 6 relays"),
             "{page}"
         );
     }
+}
+
+/// Checks that a file without a number of flying relays cannot make all drones spares.
+#[test]
+fn a_file_that_makes_all_drones_spares_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(folder.path(), "spares.toml", "[companion]\nspare = true\n");
+    let line = refusal(&format!("--scenario {file} --uavs 4 --all"));
+    assert!(
+        line.contains("companion.spare = true: would make every relay"),
+        "{line}"
+    );
 }

@@ -35,7 +35,7 @@ const ARRIVED_M: f64 = 0.5;
 const EARLY_S: f64 = 40.0;
 
 /// Time, s, from a request to leave, made while a spare is ready, to the latest time for it.
-const MARGIN_S: f64 = 30.0;
+const MARGIN_S: f64 = 60.0;
 
 /// Time left to a drone at which its relay requests to leave even if no spare waits.
 ///
