@@ -555,7 +555,7 @@ impl Lease {
                     in_place: requests.in_place && self.is_agreed,
                     ..*requests
                 };
-                Some(received.with(&own, &self.orders.joiners))
+                Some(received.with(&own, self.orders.joiners))
             }
         };
         if let Some(departures) = self.departures.first_mut() {

@@ -85,7 +85,7 @@ fn the_most_urgent_requests_are_kept() {
     let kept = |wishes: &[(u16, u16)]| {
         let all = wishes.iter().rev();
         let all = all.fold(Requests::NONE, |all, (node, left_s)| {
-            all.with(&own(*node, Some(*left_s)), &nodes(&[]))
+            all.with(&own(*node, Some(*left_s)), nodes(&[]))
         });
         all.leaves
     };
@@ -301,7 +301,7 @@ fn a_called_spare_comes_before_others() {
             gap,
             ..own(4, None)
         };
-        received.with(&own, &nodes(&[called])).spares
+        received.with(&own, nodes(&[called])).spares
     };
     // Spares 6 and 7 are in two gaps, or in one.
     let two = [0, 7, 6, 5].map(|called| spares_if_called(called, 1));

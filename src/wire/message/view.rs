@@ -372,7 +372,7 @@ impl Requests {
     /// Of two relays that want to leave and are too near to each other, the more urgent one is kept. The spares that
     /// are `called` come first, then that of the relay with the most urgent request. Without a request the spare of
     /// `own` comes first if its number is lower. Of two spares in a gap the first one is kept.
-    pub(crate) fn with(&self, own: &OwnRequests, called: &Nodes) -> Self {
+    pub(crate) fn with(&self, own: &OwnRequests, called: Nodes) -> Self {
         let mut all = Self {
             in_place: self.in_place && own.in_place,
             ..Self::NONE

@@ -162,6 +162,8 @@ fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
         listen: None,
         probe_after_ms: 0,
         sites,
+        flying: 0,
+        spare: false,
     }
 }
 
