@@ -124,17 +124,7 @@ impl<'a> Asked<'a> {
         deployment
             .check_identical(&name, &scenario)
             .map_err(|error| error.to_string())?;
-        let fleet = deployment.fleet.flying.and(deployment.fleet_size());
-        if fleet.is_none() && deployment.companion.spare == Some(true) {
-            return Err(format!(
-                "companion.spare = true: would make every relay of {name} a spare; give network.relays and fleet.flying, or leave the key out"
-            ));
-        }
-        if fleet.is_some() && options.wires {
-            return Err(format!(
-                "--wires: spares join only on a channel that all relays share, and {name} has fleet.flying: leave one of them out"
-            ));
-        }
+        let fleet = fleet_of(&deployment, options, &name)?;
         let other = |option: &str, has: &str| {
             format!(
                 "{option}: {name} has a [plan] with {has}; leave the option out, or run `cargo plan --out` again"
@@ -588,6 +578,29 @@ fn new_key() -> Result<[u8; 32], String> {
         .and_then(|mut file| file.read_exact(&mut key))
         .map_err(|error| format!("{source}: {error}"))?;
     Ok(key)
+}
+
+/// Returns the sizes of the fleet and the chain; `None` if the scenario `name` has no `fleet.flying`.
+///
+/// # Errors
+/// The key or option that contradicts the fleet.
+fn fleet_of(
+    deployment: &Deployment,
+    options: &Options,
+    name: &str,
+) -> Result<Option<FleetSize>, String> {
+    let fleet = deployment.fleet.flying.and(deployment.fleet_size());
+    if fleet.is_none() && deployment.companion.spare == Some(true) {
+        return Err(format!(
+            "companion.spare = true: would make every relay of {name} a spare; give network.relays and fleet.flying, or leave the key out"
+        ));
+    }
+    if fleet.is_some() && options.wires {
+        return Err(format!(
+            "--wires: spares join only on a channel that all relays share, and {name} has fleet.flying: leave one of them out"
+        ));
+    }
+    Ok(fleet)
 }
 
 /// Checks that the radio channel is fast enough for `uavs` relays. Wires are always fast enough.
