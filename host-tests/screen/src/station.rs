@@ -12,7 +12,7 @@
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
 //! | a relay refuses another one for another mission, old epoch or key, and that one does not report; or reports, but is refused for another mission for `LINGERS` more: a second node has its number | warning or critical, one for the refused relay |
-//! | for [`TOO_FEW_AFTER`] fewer relays in the chain than are meant to fly, and no more than at the start of this time | warning |
+//! | for 30 s fewer relays in the chain than are meant to fly, and no more than at the start of this time | warning |
 //! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
