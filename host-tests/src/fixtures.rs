@@ -1,14 +1,12 @@
 //! Common fixtures of tests: the paper's chain, and one relay of a chain.
 
 use crate::make;
+pub use crate::make::NETWORK;
 use uav_relay::{Instant, Mission, MissionConfig, Relay, Settings, ViewRecord, Wiring};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission;
-
-/// Network number of the relays in these tests.
-pub const NETWORK: u16 = 7;
 
 /// Returns the mission of the paper's chain with `relays` relays and no minimum separation.
 ///

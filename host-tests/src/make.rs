@@ -10,7 +10,8 @@ use uav_relay_oracle::random::{Chain, Style};
 use uav_relay_oracle::reference;
 use uav_relay_scenario::{RelayOverride, Source};
 
-use crate::fixtures::NETWORK;
+/// Network number of the relays in these tests.
+pub const NETWORK: u16 = 7;
 
 pub const fn adjust(rounds: u16, explore_m: f32, local: Local) -> Adjust {
     Adjust {

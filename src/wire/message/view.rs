@@ -369,9 +369,9 @@ impl Requests {
 
     /// Returns these requests of the relays farther from the leader, with those of the next relay, `own`.
     ///
-    /// Of two relays that want to leave and are too near to each other, the more urgent one is kept. The spares that
+    /// The more urgent one of two requests to leave is kept if their relays are too near to each other. The spares that
     /// are `called` come first, then that of the relay with the most urgent request. Without a request the spare of
-    /// `own` comes first if its number is lower. Of two spares in a gap the first one is kept.
+    /// `own` comes first if its number is lower. The first one of two spares in a gap is kept.
     pub(crate) fn with(&self, own: &OwnRequests, called: Nodes) -> Self {
         let mut all = Self {
             in_place: self.in_place && own.in_place,

@@ -3,6 +3,7 @@
 use rand::RngExt;
 use uav_relay::wire::message::AT_ONCE;
 use uav_relay::{Departure, Duration, HoldReason, Instant, Relay, Side};
+use uav_relay_scenario::fleet::FleetSize;
 
 use super::{Chain, ChangedRelays, QueuedEvent, undisturbed};
 use crate::report::{hop_sirs, hop_sirs_back};
@@ -65,7 +66,11 @@ impl Chain {
     pub(super) fn begin_rotation(&mut self, spec: &RotationSpec) {
         let all = self.setup.mission.relays();
         let flying = spec.flying.clamp(1, all);
-        let first: Vec<u16> = (0..flying).map(|at| 1 + at * all / flying).collect();
+        let size = FleetSize {
+            relays: all,
+            flying,
+        };
+        let first: Vec<u16> = size.first().collect();
         let places = undisturbed(&self.setup, &first, 0).unwrap_or_default();
         let altitude_m = f64::from(self.setup.mission.config().common.altitude_m);
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
